@@ -1,0 +1,16 @@
+"""Floating-point arithmetic: formats, pipelined operators, their bit-exact emulation, and datapaths made of them."""
+
+from .adder import Adder, Subtractor
+from .comparator import Comparator
+from .convert import FloatToInt, IntToFloat
+from .datapath import Datapath
+from .delay import Delay
+from .divider import Divider
+from .format import FloatFormat
+from .multiplier import Multiplier
+from .rounding import Rounding
+
+__all__ = [
+    "Adder", "Comparator", "Datapath", "Delay", "Divider", "FloatFormat", "FloatToInt", "IntToFloat", "Multiplier",
+    "Rounding", "Subtractor",
+]

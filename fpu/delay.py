@@ -1,0 +1,72 @@
+"""Delay by a fixed number of cycles."""
+
+from amaranth.hdl import Module, Mux, Shape, Signal, Value
+from amaranth.lib import memory, wiring
+from amaranth.lib.wiring import In, Out
+
+__all__ = ["Delay"]
+
+
+class Delay(wiring.Component):
+    """o(t) = i(t - cycles).
+
+    Flip-flops for a short delay; for a long one a memory that is read just ahead of where it is written. What comes
+    out before the first value went in is undefined.
+
+    Parameters
+    ----------
+    shape : shape-like
+        Shape of the value.
+    cycles : int
+        Cycles from ``i`` to ``o``; none is a wire.
+    memory_from : int
+        Cycles from which on a memory is used, at least 2.
+
+    Members
+    -------
+    i : In(shape)
+        Value.
+    o : Out(shape)
+        The same, ``cycles`` later.
+
+    Raises
+    ------
+    ValueError
+        If ``cycles`` is negative or ``memory_from`` is less than 2.
+    """
+
+    def __init__(self, shape, *, cycles, memory_from=5):
+        if cycles < 0:
+            raise ValueError(f"Delay must not be negative, but is {cycles!r} cycles")
+        if memory_from < 2:
+            raise ValueError(f"A memory delays by at least 2 cycles, not {memory_from!r}")
+        self.cycles = cycles
+        self._uses_memory = cycles >= memory_from
+        super().__init__({"i": In(shape), "o": Out(shape)})
+
+    def elaborate(self, platform):
+        m = Module()
+        if self._uses_memory:
+            self._remember(m)
+        else:
+            value = Value.cast(self.i)
+            for _ in range(self.cycles):
+                following = Signal(value.shape(), name="stage", reset_less=True)
+                m.d.sync += following.eq(value)
+                value = following
+            m.d.comb += Value.cast(self.o).eq(value)
+        return m
+
+    def _remember(self, m):
+        m.submodules.memory = ring = memory.Memory(
+            shape=Shape.cast(self.i.shape()), depth=self.cycles, init=[])
+        write, read = ring.write_port(), ring.read_port()
+        position = Signal(range(self.cycles), reset_less=True)
+        following = Signal.like(position)
+        m.d.comb += [
+            following.eq(Mux(position == self.cycles - 1, 0, position + 1)),
+            write.addr.eq(position), write.data.eq(self.i), write.en.eq(1),
+            # The oldest value, to be replaced in the next cycle: never the one being written.
+            read.addr.eq(following), self.o.eq(read.data),
+        ]
+        m.d.sync += position.eq(following)

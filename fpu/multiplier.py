@@ -1,0 +1,62 @@
+"""Multiplication."""
+
+from types import MappingProxyType, SimpleNamespace
+
+from amaranth.hdl import Cat, Const
+
+from .operator import BinaryOperator, is_inf, is_zero, round_and_pack, round_and_pack_delays
+from .pipeline import product_delay
+from .rounding import Rounding, emulated, round_nearest, round_truncate
+
+__all__ = ["Multiplier", "multiply", "multiply_truncate"]
+
+
+@emulated
+def multiply(params, a, b):
+    """``a * b`` rounded to nearest even."""
+    return round_nearest(params, a * b)
+
+
+@emulated
+def multiply_truncate(params, a, b):
+    """``a * b`` rounded towards zero; float64 holds the product exactly."""
+    return round_truncate(params, a * b)
+
+
+class Multiplier(BinaryOperator):
+    """r = a * b, rounded once.
+
+    0 * ∞ is +0. The significands' product is one multiplier block for a significand of up to 18 bits.
+
+    Parameters
+    ----------
+    fmt, latency, rounding
+        See :class:`~fpu.operator.Operator`.
+
+    Members
+    -------
+    a, b : In(fmt)
+        Operands.
+    r : Out(fmt)
+        Product, ``latency`` cycles later.
+    """
+
+    emulation = MappingProxyType({Rounding.NEAREST_EVEN: multiply, Rounding.TRUNCATE: multiply_truncate})
+
+    @classmethod
+    def _step_delays(cls, fmt):
+        return {"multiply": product_delay(fmt.sig_width), **round_and_pack_delays(fmt)}
+
+    def _compute(self, m, step):
+        fmt, a, b = self.fmt, self.a, self.b
+        zero = is_zero(a) | is_zero(b)
+        inf = is_inf(a) | is_inf(b)
+        # Zeros take part with a hidden bit; `zero` overrides what comes of it, so the block waits for no logic.
+        s = step("multiply",
+                 product=Cat(a.frac, Const(1, 1)) * Cat(b.frac, Const(1, 1)),
+                 exp=a.exp + b.exp - fmt.bias,
+                 zero=zero, inf=inf & ~zero, sign=(a.sign ^ b.sign) & ~(zero & inf))
+        below = fmt.sig_width - 2
+        s = SimpleNamespace(sig=s.product[below:], sticky=s.product[:below].any(), exp=s.exp, exp_carried=s.exp + 1,
+                            zero=s.zero, inf=s.inf, sign=s.sign)
+        m.d.comb += self.r.eq(round_and_pack(step, s, fmt=fmt, rounding=self.rounding))

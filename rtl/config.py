@@ -1,0 +1,68 @@
+"""The parameters of a whole chip; below the top, units take plain keyword arguments."""
+
+from dataclasses import dataclass, field
+
+from fpu import FloatFormat
+
+
+@dataclass(frozen=True)
+class ChipConfig:
+    """What one DynRTC is built with.
+
+    The defaults are the paper's prototype (Schmittler et al. 2004, §4.2, §4.3): 24-bit floats, 64 threads of
+    2×2 rays, 64 traversal states a packet (32 in each of the two levels), caches of about 12 KB together.
+
+    Parameters
+    ----------
+    fmt : :class:`~fpu.FloatFormat`
+        Format of every floating-point number on the chip.
+    num_threads : int
+        Packets in flight, 1…64.
+    stack_depth : int
+        Traversal states kept for each level of each packet.
+    mailbox_entries : int
+        Triangles a packet remembers having been tested against; 0 builds no mailbox.
+    node_lines, list_lines, matrix_lines : int
+        Lines of the three caches.
+    node_line_items, list_line_items : int
+        Nodes (8 bytes each) and list entries (4 bytes each) in a line; a matrix (36 bytes) is a line by itself.
+    num_fetches : int
+        Lines that each cache may have requested from memory at a time.
+    index_width : int
+        Bits of a node, list or matrix number.
+    coord_width : int
+        Bits of a pixel coordinate.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range; the message names it.
+    """
+
+    fmt: FloatFormat = field(default_factory=lambda: FloatFormat(7, 16))
+    num_threads: int = 64
+    stack_depth: int = 32
+    mailbox_entries: int = 4
+    node_lines: int = 256
+    node_line_items: int = 2
+    list_lines: int = 128
+    list_line_items: int = 4
+    matrix_lines: int = 128
+    num_fetches: int = 4
+    index_width: int = 24
+    coord_width: int = 12
+
+    def __post_init__(self):
+        ranges = {
+            "num_threads": (1, 64), "stack_depth": (1, 64), "mailbox_entries": (0, 16),
+            "node_lines": (2, 1 << 16), "node_line_items": (1, 8), "list_lines": (2, 1 << 16),
+            "list_line_items": (1, 16), "matrix_lines": (2, 1 << 16), "num_fetches": (1, 16),
+            "index_width": (8, 24), "coord_width": (4, 14),
+        }
+        for name, (low, high) in ranges.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} is {value}; it must be from {low} to {high}")
+        for name in ("node_lines", "list_lines", "matrix_lines", "node_line_items", "list_line_items"):
+            if getattr(self, name).bit_count() != 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be a power of two")

@@ -1,0 +1,194 @@
+"""Intersection of rays with the unit triangle, and the closest hit of each ray."""
+
+from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.lib import data, memory, stream, wiring
+from amaranth.lib.wiring import In, Out
+from amaranth.utils import ceil_log2
+
+from fpu import Datapath, Delay
+
+from .layout import PACKET_RAYS, token_layout, vector_layout, with_token
+
+__all__ = ["Intersection", "unit_triangle", "hit_layout"]
+
+
+def unit_triangle(fmt, *, latencies=None):
+    """t = −O′z / D′z, u = O′x + t·D′x, v = O′y + t·D′y; ``hit`` if 0 < t < ∞, u ≥ 0, v ≥ 0 and u + v ≤ 1.
+
+    ``nearer`` if t < t_hit, which comes in just in time, as late as t is known (paper §2.1.2).
+
+    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator.
+    """
+    dp = Datapath(fmt, latencies=latencies)
+    origin, direction = dp.vector("origin"), dp.vector("direction")
+    t = dp.neg(dp.div(origin.z, direction.z))
+    t_hit = dp.input("t_hit", delay=dp.arrival(t))
+    u = dp.add(origin.x, dp.mul(t, direction.x))
+    v = dp.add(origin.y, dp.mul(t, direction.y))
+    ahead = dp.logical_and(dp.is_finite(t), dp.logical_not(dp.sign(t)), dp.logical_not(dp.is_zero(t)))
+    inside = dp.logical_and(dp.logical_not(dp.is_negative(u)), dp.logical_not(dp.is_negative(v)),
+                            dp.is_at_most_one(dp.add(u, v)))
+    dp.output("t", t)
+    dp.output("u", u)
+    dp.output("v", v)
+    dp.output("hit", dp.logical_and(ahead, inside))
+    dp.output("nearer", dp.lt(t, t_hit))
+    return dp
+
+
+def hit_layout(*, fmt, index_width):
+    """A ray's hit: where on which triangle of which instance, and D′z, the cosine of §2.1.3."""
+    return data.StructLayout({
+        "t": fmt, "u": fmt, "v": fmt, "cosine": fmt,
+        "triangle": index_width, "instance": index_width, "in_instance": 1,
+    })
+
+
+class Intersection(wiring.Component):
+    """Tests a ray against the unit triangle each clock, and keeps each ray's closest hit.
+
+    A hit at the same distance as an earlier one does not replace it.
+
+    Parameters
+    ----------
+    fmt : :class:`~fpu.FloatFormat`
+        Format of coordinates.
+    num_threads, stack_depth, index_width : int
+        See :class:`~rtl.config.ChipConfig`.
+
+    Members
+    -------
+    vector : stream of ``{"token", "index", "is_origin", "ray", "last", "vector"}``: rays in the triangle's
+        space, of each packet the origin first
+    entered : ``{"valid", "thread", "index"}``: the packet's next hits belong to that instance
+    tested : stream of tokens: a packet's rays are through, and its token knows which have a hit
+    hit_address, hit_distances : a thread; two cycles later, t of each ray's hit
+    record_address, record : a thread and a ray; two cycles later, its hit
+    busy : a ray is taken in
+    """
+
+    def __init__(self, *, fmt, num_threads, stack_depth, index_width):
+        self._fmt = fmt
+        self._num_threads = num_threads
+        self._index_width = index_width
+        self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
+        self._record = hit_layout(fmt=fmt, index_width=index_width)
+        super().__init__({
+            "vector": In(stream.Signature(with_token(
+                token, index=index_width, is_origin=1, ray=range(PACKET_RAYS), last=1,
+                vector=vector_layout(fmt)), always_ready=True)),
+            "entered": In(data.StructLayout({"valid": 1, "thread": range(num_threads), "index": index_width})),
+            "tested": Out(stream.Signature(token, always_ready=True)),
+            "hit_address": In(range(num_threads)),
+            "hit_distances": Out(data.ArrayLayout(fmt, PACKET_RAYS)),
+            "record_address": In(data.StructLayout({"ray": range(PACKET_RAYS), "thread": range(num_threads)})),
+            "record": Out(self._record),
+            "busy": Out(1),
+        })
+
+    def elaborate(self, platform):
+        m = Module()
+        num_slots = 1 << ceil_log2(self._num_threads)
+        graph = unit_triangle(self._fmt)
+        m.submodules.test = test = graph.component()
+
+        vector = self.vector.payload
+        origin = Signal(vector_layout(self._fmt), reset_less=True)
+        after_origin = Signal(reset_less=True)
+        taken = Signal()
+        with m.If(self.vector.valid):
+            m.d.sync += after_origin.eq(vector.is_origin)
+            with m.If(vector.is_origin):
+                m.d.sync += origin.eq(vector.vector)
+        m.d.comb += [taken.eq(self.vector.valid & ~vector.is_origin), self.busy.eq(taken)]
+        for axis in "xyz":
+            m.d.comb += [
+                getattr(test, f"origin_{axis}").eq(getattr(origin, axis)),
+                getattr(test, f"direction_{axis}").eq(getattr(vector.vector, axis)),
+            ]
+
+        # The distance to beat has its address two cycles before it is wanted.
+        beside_layout = data.StructLayout({"token": self._token, "ray": range(PACKET_RAYS), "first": 1, "last": 1,
+                                           "index": self._index_width, "cosine": self._fmt})
+        ask_at = graph.inputs["t_hit"].start - 2
+        m.submodules.to_ask = to_ask = Delay(beside_layout, cycles=ask_at)
+        m.submodules.to_end = to_end = Delay(beside_layout, cycles=graph.latency - ask_at)
+        valid = Signal(graph.latency + 1)
+        m.d.comb += [
+            to_ask.i.token.eq(vector.token),
+            to_ask.i.ray.eq(vector.ray),
+            to_ask.i.first.eq(after_origin),
+            to_ask.i.last.eq(vector.last),
+            to_ask.i.index.eq(vector.index),
+            to_ask.i.cosine.eq(vector.vector.z),
+            to_end.i.eq(to_ask.o),
+            valid[0].eq(taken),
+        ]
+        m.d.sync += valid[1:].eq(valid[:-1])
+        m.submodules.distances = distances = memory.Memory(
+            shape=self._fmt, depth=PACKET_RAYS * num_slots, init=[])
+        distance_read, distance_write = distances.read_port(), distances.write_port()
+        distance = Signal(self._fmt, reset_less=True)
+        m.d.comb += [
+            distance_read.addr.eq(Cat(to_ask.o.ray, to_ask.o.token.thread)),
+            test.t_hit.eq(distance),
+        ]
+        m.d.sync += distance.eq(distance_read.data)
+
+        done = to_end.o
+        before = Signal(PACKET_RAYS)
+        now = Signal(PACKET_RAYS)
+        hits_so_far = Signal(PACKET_RAYS, reset_less=True)
+        better = Signal()
+        m.d.comb += [
+            better.eq(valid[-1] & test.hit & (test.nearer | ~done.token.hit.bit_select(done.ray, 1))),
+            before.eq(Mux(done.first, done.token.hit, hits_so_far)),
+            now.eq(before | (better << done.ray)),
+            self.tested.payload.eq(done.token),
+            self.tested.payload.hit.eq(now),
+            self.tested.valid.eq(valid[-1] & done.last),
+        ]
+        with m.If(valid[-1]):
+            m.d.sync += hits_so_far.eq(now)
+
+        m.submodules.instances = instances = memory.Memory(shape=self._index_width, depth=num_slots, init=[])
+        entered_write, instance_read = instances.write_port(), instances.read_port(domain="comb")
+        m.submodules.records = records = memory.Memory(shape=self._record, depth=PACKET_RAYS * num_slots, init=[])
+        record_read, record_write = records.read_port(), records.write_port()
+        record = Signal(self._record, reset_less=True)
+        m.d.comb += [
+            entered_write.addr.eq(self.entered.thread),
+            entered_write.data.eq(self.entered.index),
+            entered_write.en.eq(self.entered.valid),
+            instance_read.addr.eq(done.token.thread),
+            distance_write.addr.eq(Cat(done.ray, done.token.thread)),
+            distance_write.data.eq(test.t),
+            distance_write.en.eq(better),
+            record_write.addr.eq(Cat(done.ray, done.token.thread)),
+            record_write.data.t.eq(test.t),
+            record_write.data.u.eq(test.u),
+            record_write.data.v.eq(test.v),
+            record_write.data.cosine.eq(done.cosine),
+            record_write.data.triangle.eq(done.index),
+            record_write.data.instance.eq(instance_read.data),
+            record_write.data.in_instance.eq(done.token.level),
+            record_write.en.eq(better),
+            record_read.addr.eq(self.record_address),
+            self.record.eq(record),
+        ]
+        m.d.sync += record.eq(record_read.data)
+
+        # A second copy of the distances, a memory for each ray, for the stack, which wants all four at once.
+        for ray in range(PACKET_RAYS):
+            m.submodules[f"distances{ray}"] = bank = memory.Memory(shape=self._fmt, depth=num_slots, init=[])
+            bank_read, bank_write = bank.read_port(), bank.write_port()
+            bank_distance = Signal(self._fmt, name=f"distance{ray}", reset_less=True)
+            m.d.comb += [
+                bank_write.addr.eq(done.token.thread),
+                bank_write.data.eq(test.t),
+                bank_write.en.eq(better & (done.ray == ray)),
+                bank_read.addr.eq(self.hit_address),
+                self.hit_distances[ray].eq(bank_distance),
+            ]
+            m.d.sync += bank_distance.eq(bank_read.data)
+        return m

@@ -1,0 +1,129 @@
+"""The rays of all threads, kept twice: by axis for traversal, by vector for transformation."""
+
+from amaranth.hdl import Cat, Module, Signal
+from amaranth.lib import data, memory, wiring
+from amaranth.lib.wiring import In, Out
+from amaranth.utils import ceil_log2
+
+from .layout import PACKET_RAYS, Axis, vector_layout
+
+__all__ = ["RayStore", "ray_store_ports"]
+
+
+def ray_store_ports(*, fmt, num_threads):
+    """Shapes of the members of a :class:`RayStore`."""
+    vector = {"thread": range(num_threads), "level": 1, "is_origin": 1, "ray": range(PACKET_RAYS)}
+    return {
+        "write": data.StructLayout({"valid": 1, **vector, "vector": vector_layout(fmt)}),
+        "step_address": data.StructLayout({"thread": range(num_threads), "level": 1, "axis": Axis}),
+        "step_rays": data.ArrayLayout(data.StructLayout({"origin": fmt, "direction": fmt}), PACKET_RAYS),
+        "vector_address": data.StructLayout(vector),
+        "vector": vector_layout(fmt),
+    }
+
+
+class RayStore(wiring.Component):
+    """Holds origin and direction of each ray of each thread, in the scene's and in the instance's space.
+
+    A kd-step needs one coordinate of four rays, the transformation three coordinates of one ray. Each gets a
+    memory of its own; both are written together. The one for kd-steps takes a vector in three cycles, an axis
+    a cycle, in a bank for each ray's origin and for each ray's direction: writers must leave three cycles
+    between vectors for the same bank, which a packet's vectors, written in turn, do by themselves.
+
+    A packet has one origin for all its rays.
+
+    Parameters
+    ----------
+    fmt : :class:`~fpu.FloatFormat`
+        Format of coordinates.
+    num_threads : int
+        Threads.
+
+    Members
+    -------
+    write : ``{"valid", "thread", "level", "is_origin", "ray", "vector"}``, one vector of one packet; steps can
+        read it ``write_latency`` cycles later
+    step_address : ``{"thread", "level", "axis"}``; two cycles later
+    step_rays : array of ``{"origin", "direction"}``: the coordinate of each ray
+    vector_address : ``{"thread", "level", "is_origin", "ray"}``; two cycles later
+    vector : the coordinates of the one vector
+    """
+
+    read_latency = 2
+    write_latency = 4
+
+    def __init__(self, *, fmt, num_threads):
+        self._fmt = fmt
+        self._num_threads = num_threads
+        ports = ray_store_ports(fmt=fmt, num_threads=num_threads)
+        super().__init__({
+            "write": In(ports["write"]),
+            "step_address": In(ports["step_address"]),
+            "step_rays": Out(ports["step_rays"]),
+            "vector_address": In(ports["vector_address"]),
+            "vector": Out(ports["vector"]),
+        })
+
+    def _bank(self, m, name, *, select, field):
+        """One coordinate memory; takes a vector when ``select`` is set."""
+        thread_bits = ceil_log2(self._num_threads)
+        m.submodules[name] = bank = memory.Memory(shape=self._fmt, depth=1 << thread_bits + 3, init=[])
+        write, read = bank.write_port(), bank.read_port()
+        axis = Signal(Axis, name=f"{name}_axis", init=Axis.LEAF)
+        held = Signal(data.StructLayout({"level": 1, "thread": range(1 << thread_bits)}), name=f"{name}_held",
+                      reset_less=True)
+        vector = Signal(vector_layout(self._fmt), name=f"{name}_vector", reset_less=True)
+        coordinate = Signal(self._fmt, name=f"{name}_q", reset_less=True)
+        m.d.comb += [
+            write.addr.eq(Cat(axis, held.level, held.thread)),
+            write.data.eq(vector.x),
+            write.en.eq(axis != Axis.LEAF),
+            read.addr.eq(Cat(self.step_address.axis, self.step_address.level, self.step_address.thread)),
+            field.eq(coordinate),
+        ]
+        m.d.sync += [
+            coordinate.eq(read.data),
+            vector.x.eq(vector.y),
+            vector.y.eq(vector.z),
+        ]
+        with m.Switch(axis):
+            with m.Case(Axis.X):
+                m.d.sync += axis.eq(Axis.Y)
+            with m.Case(Axis.Y):
+                m.d.sync += axis.eq(Axis.Z)
+            with m.Case(Axis.Z):
+                m.d.sync += axis.eq(Axis.LEAF)
+        with m.If(select):
+            m.d.sync += [
+                axis.eq(Axis.X),
+                held.level.eq(self.write.level),
+                held.thread.eq(self.write.thread),
+                vector.eq(self.write.vector),
+            ]
+
+    def elaborate(self, platform):
+        m = Module()
+        take_origin = Signal()
+        m.d.comb += take_origin.eq(self.write.valid & self.write.is_origin)
+        for ray in range(PACKET_RAYS):
+            self._bank(m, f"origin{ray}", select=take_origin, field=self.step_rays[ray].origin)
+            take_direction = Signal(name=f"take_direction{ray}")
+            m.d.comb += take_direction.eq(self.write.valid & ~self.write.is_origin & (self.write.ray == ray))
+            self._bank(m, f"direction{ray}", select=take_direction, field=self.step_rays[ray].direction)
+
+        def address(of):
+            return Cat(of.ray, of.is_origin, of.level, of.thread)
+
+        depth = 1 << len(address(self.vector_address))
+        m.submodules.vectors = vectors = memory.Memory(shape=vector_layout(self._fmt), depth=depth, init=[])
+        write, read = vectors.write_port(), vectors.read_port()
+        vector = Signal(vector_layout(self._fmt), reset_less=True)
+        m.d.comb += [
+            write.addr.eq(address(self.write)),
+            write.data.eq(self.write.vector),
+            write.en.eq(self.write.valid),
+            read.addr.eq(address(self.vector_address)),
+            self.vector.eq(vector),
+        ]
+        m.d.sync += vector.eq(read.data)
+        return m

@@ -1,0 +1,6 @@
+"""The golden ray tracer: float64 throughout, sharing nothing with the chip's arithmetic or its spatial index."""
+
+from .compare import Comparison, compare, psnr
+from .tracer import Hits, render, trace
+
+__all__ = ["Comparison", "Hits", "compare", "psnr", "render", "trace"]

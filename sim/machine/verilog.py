@@ -1,0 +1,24 @@
+"""A component as Verilog, each of its members a port."""
+
+from amaranth.back import verilog
+from amaranth.hdl import Const, ValueCastable
+from amaranth.hdl._ir import PortDirection
+from amaranth.lib import wiring
+
+__all__ = ["component_verilog"]
+
+
+def component_verilog(component, *, name):
+    """Verilog text of ``component`` as module ``name``; a member a.b becomes the port a_b.
+
+    Unlike :func:`amaranth.back.verilog.convert` by itself, this takes streams that are always ready: their
+    ``ready`` is a constant and becomes no port.
+    """
+    ports = {}
+    for path, member, value in component.signature.flatten(component):
+        if isinstance(value, ValueCastable):
+            value = value.as_value()
+        if not isinstance(value, Const):
+            direction = PortDirection.Input if member.flow == wiring.In else PortDirection.Output
+            ports["_".join(map(str, path))] = (value, direction)
+    return verilog.convert(component, name=name, ports=ports, emit_src=False, strip_internal_attrs=True)

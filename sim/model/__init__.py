@@ -1,0 +1,5 @@
+"""The chip without a clock: its arithmetic and the order of its decisions, bit for bit."""
+
+from .model import render_model
+
+__all__ = ["render_model"]

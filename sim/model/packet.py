@@ -1,0 +1,204 @@
+"""One packet's way through the chip."""
+
+import numba
+import numpy as np
+
+from fpu import FloatFormat
+from rtl.intersection import unit_triangle
+from rtl.transformation import affine_map
+from rtl.traversal import kd_step
+
+from ..scene.image import INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, UPPER_EMPTY
+
+__all__ = ["COUNTS", "trace_packet"]
+
+# The kernels are the same for every format, which they take as an argument.
+_ANY = FloatFormat(7, 16)
+_kd_step = kd_step(_ANY).kernel()
+_affine_map = affine_map(_ANY).kernel()
+_unit_triangle = unit_triangle(_ANY).kernel()
+
+_VISIT, _LIST, _POP = range(3)
+
+#: What a packet's work is counted in.
+COUNTS = ("steps", "leaves", "entries", "transformed_vectors", "triangle_tests", "instances", "pops", "stack_depth")
+_STEPS, _LEAVES, _ENTRIES, _VECTORS, _TESTS, _INSTANCES, _POPS, _DEPTH = range(8)
+
+
+@numba.njit(error_model="numpy")
+def _transform(params, matrix, vector, is_point):
+    return _affine_map(params, is_point, vector[0], vector[1], vector[2], matrix[3, 0], matrix[3, 1], matrix[3, 2],
+                       matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[1, 0], matrix[1, 1], matrix[1, 2],
+                       matrix[2, 0], matrix[2, 1], matrix[2, 2])
+
+
+@numba.njit(error_model="numpy")
+def trace_packet(params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, camera, screen, mask,
+                 hits, owners, counts):
+    """Traces four rays; see :func:`~sim.model.model.render_model` for what the arrays hold.
+
+    Parameters
+    ----------
+    params : tuple
+        ``fmt.params``.
+    root, nodes, splits, lists, matrices
+        The memory image, floats decoded.
+    camera : float64[4, 3]
+        Rows and origin.
+    screen : float64[4, 2]
+        x and y of each ray.
+    mask : int
+        Rays that take part.
+    hits : float64[4, 4]
+        Receives t, u, v, D′z of each ray.
+    owners : int64[4, 2]
+        Receives the triangle and the instance of each ray, −1 for none.
+    counts : int64[8]
+        See :data:`COUNTS`; sums, of stack_depth the maximum.
+
+    Returns
+    -------
+    bool
+        False if the stack is too small.
+    """
+    origin = np.empty((2, 3))
+    direction = np.empty((2, 4, 3))
+    vector = np.empty(3)
+    interval = np.empty((2, 4, 2))
+    stack_node = np.empty((2, stack_depth), np.int64)
+    stack_mask = np.empty((2, stack_depth), np.int64)
+    stack_interval = np.empty((2, stack_depth, 4, 2))
+    sp = np.zeros(2, np.int64)
+    position = np.zeros(2, np.int64)
+    is_last = np.zeros(2, np.bool_)
+    leaf_mask = np.zeros(2, np.int64)
+    letters = np.full((max(mailbox_entries, 1), 2), 0, np.int64)
+    next_letter = 0
+    child_interval = np.empty((2, 4, 2))
+
+    origin[0] = camera[3]
+    counts[_VECTORS] += 1
+    for ray in range(4):
+        owners[ray, 0] = owners[ray, 1] = -1
+        if mask >> ray & 1:
+            counts[_VECTORS] += 1
+            vector[0], vector[1], vector[2] = screen[ray, 0], screen[ray, 1], 1.0
+            # The camera's origin is not mapped, so the fourth row of its matrix does not matter.
+            direction[0, ray] = _transform(params, camera, vector, False)
+            interval[0, ray, 0], interval[0, ray, 1] = 0.0, np.inf
+
+    level, node, instance, action = 0, root, -1, _VISIT
+    while True:
+        if action == _VISIT:
+            word = nodes[node]
+            axis = word >> 24 & 3
+            child = word & INDEX_MASK
+            if axis == 3:
+                counts[_LEAVES] += 1
+                position[level] = child
+                leaf_mask[level] = mask
+                action = _LIST
+                continue
+            counts[_STEPS] += 1
+            lower_mask = upper_mask = 0
+            upper_first = -1
+            for ray in range(4):
+                if not mask >> ray & 1:
+                    continue
+                lower, upper, lower_near, lower_far, upper_near, upper_far, backward = _kd_step(
+                    params, splits[node], origin[level, axis], direction[level, ray, axis], interval[level, ray, 0],
+                    interval[level, ray, 1])
+                if upper_first < 0:
+                    upper_first = 1 if backward else 0
+                if lower and not word & LOWER_EMPTY:
+                    lower_mask |= 1 << ray
+                if upper and not word & UPPER_EMPTY:
+                    upper_mask |= 1 << ray
+                child_interval[0, ray, 0], child_interval[0, ray, 1] = lower_near, lower_far
+                child_interval[1, ray, 0], child_interval[1, ray, 1] = upper_near, upper_far
+            if not lower_mask and not upper_mask:
+                action = _POP
+                continue
+            to_upper = 1 if upper_mask and (upper_first == 1 or not lower_mask) else 0
+            if lower_mask and upper_mask:
+                if sp[level] == stack_depth:
+                    return False
+                entry = sp[level]
+                stack_node[level, entry] = child + 1 - to_upper
+                stack_mask[level, entry] = lower_mask if to_upper else upper_mask
+                stack_interval[level, entry] = child_interval[1 - to_upper]
+                sp[level] += 1
+                counts[_DEPTH] = max(counts[_DEPTH], sp[level])
+            node = child + to_upper
+            mask = upper_mask if to_upper else lower_mask
+            interval[level] = child_interval[to_upper]
+
+        elif action == _POP:
+            if sp[level] == 0:
+                if level == 0:
+                    return True
+                level = 0
+                action = _POP if is_last[0] else _LIST
+                continue
+            counts[_POPS] += 1
+            sp[level] -= 1
+            entry = sp[level]
+            mask = 0
+            for ray in range(4):
+                if stack_mask[level, entry] >> ray & 1:
+                    if owners[ray, 0] < 0 or stack_interval[level, entry, ray, 0] <= hits[ray, 0]:
+                        mask |= 1 << ray
+            if mask:
+                interval[level] = stack_interval[level, entry]
+                node = stack_node[level, entry]
+                action = _VISIT
+
+        else:
+            counts[_ENTRIES] += 1
+            word = lists[position[level]]
+            position[level] += 1
+            is_last[level] = word & LAST_ENTRY != 0
+            index = word & INDEX_MASK
+            matrix = matrices[index]
+            if word & INSTANCE_ENTRY:
+                counts[_INSTANCES] += 1
+                counts[_VECTORS] += 1
+                mask = leaf_mask[0]
+                letters[:, 1] = 0
+                next_letter = 0
+                origin[1] = _transform(params, matrix, origin[0], True)
+                for ray in range(4):
+                    if mask >> ray & 1:
+                        counts[_VECTORS] += 1
+                        direction[1, ray] = _transform(params, matrix, direction[0, ray], False)
+                        interval[1, ray] = interval[0, ray]
+                level, sp[1], instance, node, action = 1, 0, index, index, _VISIT
+                continue
+            wanted = leaf_mask[level]
+            if mailbox_entries:
+                place = -1
+                for number in range(mailbox_entries):
+                    if letters[number, 0] == index and letters[number, 1]:
+                        place = number
+                if place < 0:
+                    place = next_letter
+                    next_letter = (next_letter + 1) % mailbox_entries
+                    letters[place, 0] = index
+                    letters[place, 1] = 0
+                tested = letters[place, 1]
+                letters[place, 1] = tested | wanted
+                wanted &= ~tested
+            if wanted:
+                counts[_VECTORS] += 1
+                ox, oy, oz = _transform(params, matrix, origin[level], True)
+                for ray in range(4):
+                    if wanted >> ray & 1:
+                        counts[_VECTORS] += 1
+                        counts[_TESTS] += 1
+                        dx, dy, dz = _transform(params, matrix, direction[level, ray], False)
+                        t, u, v, hit, nearer = _unit_triangle(params, ox, oy, oz, dx, dy, dz, hits[ray, 0])
+                        if hit and (nearer or owners[ray, 0] < 0):
+                            hits[ray, 0], hits[ray, 1], hits[ray, 2], hits[ray, 3] = t, u, v, dz
+                            owners[ray, 0] = index
+                            owners[ray, 1] = instance if level else -1
+            action = _POP if is_last[level] else _LIST

@@ -1,0 +1,133 @@
+"""The memory image: what the chip reads, word by word.
+
+All memories are arrays of little-endian 32-bit words, addressed by items:
+
+========  =====  =================================================================================================
+memory    words  item
+========  =====  =================================================================================================
+nodes     2      bits 0–23 child, 24–25 axis (3: leaf), 26 lower child is empty, 27 upper child is empty; 32–… split
+                 position as a float. Inner node: children are ``child`` (even) and ``child`` + 1. Leaf: ``child`` is
+                 the first list entry. Nodes 0…n − 1 are where the n instances begin, each a copy of its mesh's root.
+lists     1      bits 0–23 matrix number, 30 it is an instance, 31 last of its leaf
+matrices  ⌈12·w  rows 0, 1, 2 of m (x, y, z each), then C: twelve floats of w bits, packed without gaps. Matrices
+          ÷ 32⌉  0…n − 1 are those of the n instances, the others those of triangles.
+shading   1      of the triangle with that matrix number: bits 0–7 blue, 8–15 green, 16–23 red
+========  =====  =================================================================================================
+"""
+
+import zlib
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fpu import FloatFormat
+
+from .kdtree import LEAF
+
+__all__ = ["SceneImage", "describe"]
+
+AXIS_SHIFT, LOWER_EMPTY, UPPER_EMPTY = 24, 1 << 26, 1 << 27
+INDEX_MASK = (1 << 24) - 1
+INSTANCE_ENTRY, LAST_ENTRY = 1 << 30, 1 << 31
+
+
+@dataclass(frozen=True, eq=False)
+class SceneImage:
+    """A scene as the chip sees it, and what the host needs to understand the chip's answers.
+
+    Parameters
+    ----------
+    fmt : FloatFormat
+        Format of all floats.
+    root : int
+        Node at which primary rays begin.
+    nodes : uint32[N, 2]
+    lists : uint32[L]
+    matrices : uint32[M, W]
+    shading : uint32[M]
+        The memories, see the module's text.
+    num_instances : int
+        Instances that are transformed on the chip; 0 if all triangles are in the scene's own space.
+    stack_depth : int
+        Entries a traversal stack needs at most.
+    triangle_instance, triangle_prim : int32[M]
+        The triangle of each matrix; its instance is −1 if the chip tells it.
+    instance_ids : int32[num_instances]
+        The scene's instance that is the chip's n-th.
+    center : float64[3]
+    scale : float
+        The chip's scene coordinates are (world − center) · scale.
+    stats : dict
+        Counts for reports.
+    """
+
+    fmt: FloatFormat
+    root: int
+    nodes: np.ndarray
+    lists: np.ndarray
+    matrices: np.ndarray
+    shading: np.ndarray
+    num_instances: int
+    stack_depth: int
+    triangle_instance: np.ndarray
+    triangle_prim: np.ndarray
+    instance_ids: np.ndarray
+    center: np.ndarray
+    scale: float
+    stats: dict = field(default_factory=dict)
+
+    @property
+    def num_bytes(self):
+        """Size of all memories together."""
+        return sum(memory.nbytes for memory in (self.nodes, self.lists, self.matrices, self.shading))
+
+    @property
+    def checksum(self):
+        """CRC-32 of all memories."""
+        crc = 0
+        for memory in (self.nodes, self.lists, self.matrices, self.shading):
+            crc = zlib.crc32(memory.astype("<u4").tobytes(), crc)
+        return crc
+
+    def matrix_values(self):
+        """float64[M, 4, 3]: the three rows and C of each matrix."""
+        width = self.fmt.width
+        values = np.empty((len(self.matrices), 12))
+        words = np.concatenate([self.matrices, np.zeros((len(self.matrices), 1), np.uint32)], axis=1).astype(np.uint64)
+        for k in range(12):
+            word, shift = divmod(k * width, 32)
+            pair = words[:, word] | words[:, word + 1] << np.uint64(32)
+            values[:, k] = self.fmt.decode(pair >> np.uint64(shift) & np.uint64((1 << width) - 1))
+        return values.reshape(-1, 4, 3)
+
+    def split_values(self):
+        """float64[N]: the split position of each node."""
+        return self.fmt.decode(self.nodes[:, 1])
+
+
+def describe(image, *, limit=20):
+    """Lines that print an image, the first ``limit`` items of each memory."""
+    yield (f"format {image.fmt}, {image.num_bytes:,} bytes, CRC-32 {image.checksum:08x}, root {image.root}, "
+           f"{image.num_instances} instances, stack {image.stack_depth}")
+    yield f"world to scene: (x - {image.center.tolist()}) * {image.scale:g}"
+    splits = image.split_values()
+    yield f"nodes: {len(image.nodes)}"
+    for number, (word, _) in enumerate(image.nodes[:limit].tolist()):
+        axis, child = word >> AXIS_SHIFT & 3, word & INDEX_MASK
+        if axis == LEAF:
+            yield f"  {number:8d}  leaf    list {child}"
+        else:
+            empty = "".join(f", {name} empty" for name, bit in (("lower", LOWER_EMPTY), ("upper", UPPER_EMPTY))
+                            if word & bit)
+            yield f"  {number:8d}  {'xyz'[axis]} {splits[number]:<12.6g} children {child}, {child + 1}{empty}"
+    yield f"lists: {len(image.lists)}"
+    for number, word in enumerate(image.lists[:limit].tolist()):
+        kind = "instance" if word & INSTANCE_ENTRY else "triangle"
+        yield f"  {number:8d}  {kind} {word & INDEX_MASK}{', last' if word & LAST_ENTRY else ''}"
+    yield f"matrices: {len(image.matrices)}"
+    for number, matrix in enumerate(image.matrix_values()[:limit]):
+        rows = "  ".join("[" + " ".join(f"{value:.6g}" for value in row) + "]" for row in matrix)
+        yield f"  {number:8d}  {rows}"
+    yield f"shading: {len(image.shading)}"
+    for number, word in enumerate(image.shading[:limit].tolist()):
+        yield f"  {number:8d}  #{word & 0xFFFFFF:06x}"

@@ -1,0 +1,46 @@
+"""From a file's name to a scene."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from .check import unusable_warnings
+from .error import SceneError
+from .gltf import load_gltf
+from .obj import load_obj
+from .ply import load_ply
+from .room import room_scene
+
+__all__ = ["load_scene"]
+
+_LOADERS = {".obj": load_obj, ".ply": load_ply, ".ply.gz": load_ply, ".gltf": load_gltf, ".glb": load_gltf}
+
+
+def load_scene(path):
+    """Scene from a file, by the extension of its name.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A file ending in .obj, .ply, .ply.gz, .gltf or .glb, or the name ``room`` for the built-in room.
+
+    Raises
+    ------
+    SceneError
+        If the file is missing, of an unknown format, or broken.
+    """
+    path = Path(path)
+    if str(path) == "room":
+        return room_scene()
+    loader = next((load for suffix, load in _LOADERS.items() if path.name.lower().endswith(suffix)), None)
+    if loader is None:
+        raise SceneError(f"{path}: unknown scene format; supported are {', '.join(_LOADERS)} "
+                         "and the built-in scene 'room'")
+    try:
+        scene = loader(path)
+    except OSError as error:
+        raise SceneError(f"{path}: {error.strerror or error}") from error
+    except SceneError as error:
+        if str(error).startswith(str(path)):
+            raise
+        raise SceneError(f"{path}: {error}") from error
+    return replace(scene, warnings=scene.warnings + unusable_warnings(scene.meshes))

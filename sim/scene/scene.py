@@ -1,0 +1,204 @@
+"""The scene in memory: meshes, their instances, materials, cameras and motion."""
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from .camera import Camera
+from .check import usable_triangles
+from .error import SceneError
+
+__all__ = ["Camera", "DEFAULT_MATERIAL", "IDENTITY", "Instance", "Material", "Mesh", "Scene", "SceneError"]
+
+IDENTITY = np.eye(3, 4)
+
+# Condition number from which the inverse of a 3×3 in float64 has no correct bit left.
+_MAX_CONDITION = 1e14
+
+
+@dataclass(frozen=True)
+class Material:
+    """Look of a surface: its name and its diffuse colour, linear RGB within 0…1."""
+
+    name: str
+    base_color: tuple[float, float, float]
+
+
+DEFAULT_MATERIAL = Material("default", (0.8, 0.8, 0.8))
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in object space; a triangle's number in its mesh is its ``prim_id``.
+
+    Parameters
+    ----------
+    name : str
+    vertices : float64[V, 3]
+    triangles : int32[T, 3]
+        Indices of the corners v0, v1, v2.
+    material_ids : int32[T]
+        Indices into the scene's materials.
+    normals : float64[T, 3, 3], optional
+        Shading normal of each corner, in object space.
+    uvs : float64[T, 3, 2], optional
+        Texture coordinates of each corner.
+    """
+
+    name: str
+    vertices: np.ndarray
+    triangles: np.ndarray
+    material_ids: np.ndarray
+    normals: np.ndarray | None = None
+    uvs: np.ndarray | None = None
+
+    @property
+    def num_triangles(self):
+        """Number of triangles, unusable ones included."""
+        return len(self.triangles)
+
+    @cached_property
+    def usable(self):
+        """bool[T], see :func:`sim.scene.check.usable_triangles`."""
+        return usable_triangles(self)
+
+    @cached_property
+    def _bounds(self):
+        corners = self.vertices[self.triangles[self.usable]].reshape(-1, 3)
+        if not len(corners):
+            return np.full(3, math.inf), np.full(3, -math.inf)
+        return corners.min(axis=0), corners.max(axis=0)
+
+    def bounds(self):
+        """``(lower, upper)`` float64[3] of the usable triangles; (inf, −inf) if there are none."""
+        return self._bounds
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A mesh placed in the world by a transform; its index in the scene is its ``instance_id``.
+
+    Parameters
+    ----------
+    mesh : int
+        Index into the scene's meshes.
+    transform : float64[3, 4]
+        Maps object space to world space: [A | b], X ↦ A·X + b.
+    name : str
+    """
+
+    mesh: int
+    transform: np.ndarray
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that is needed to render: meshes, instances, materials, cameras, motion.
+
+    Parameters
+    ----------
+    meshes : list of Mesh
+    instances : list of Instance
+        Nodes that carry a mesh, in file order.
+    materials : list of Material
+    cameras : list of Camera
+    animation : Animation, optional
+        Motion of the instances and cameras.
+    warnings : list of str
+        What was odd in the file and how it was taken.
+
+    Raises
+    ------
+    SceneError
+        If nothing in the scene can be hit, or an instance's transform has no inverse.
+    """
+
+    meshes: list[Mesh]
+    instances: list[Instance]
+    materials: list[Material]
+    cameras: list[Camera] = field(default_factory=list)
+    animation: object | None = None
+    warnings: list[str] = field(default_factory=list)
+
+    def __post_init__(self):
+        for number, instance in enumerate(self.instances):
+            linear = instance.transform[:, :3]
+            if not np.isfinite(instance.transform).all():
+                raise SceneError(f"node '{instance.name}' (instance {number}): transform has a value that is not "
+                                 "finite")
+            if np.linalg.matrix_rank(linear) < 3 or np.linalg.cond(linear) > _MAX_CONDITION:
+                raise SceneError(f"node '{instance.name}' (instance {number}): transform is singular (flattens "
+                                 "the mesh); give it a non-zero scale on every axis")
+        if not any(self.meshes[instance.mesh].usable.any() for instance in self.instances):
+            raise SceneError("scene is empty: no instance has a usable triangle")
+
+    @property
+    def num_triangles(self):
+        """Number of triangles that rays can meet, every instance counted."""
+        return sum(self.meshes[instance.mesh].num_triangles for instance in self.instances)
+
+    @property
+    def num_stored_triangles(self):
+        """Number of triangles in memory, each mesh counted once."""
+        return sum(mesh.num_triangles for mesh in self.meshes)
+
+    def bounds(self):
+        """``(lower, upper)`` float64[3], world space, of the corners of the instances' boxes."""
+        corners = []
+        for instance in self.instances:
+            box = np.array(self.meshes[instance.mesh].bounds())
+            if np.isfinite(box).all():
+                which = np.indices((2, 2, 2)).reshape(3, 8).T
+                points = np.take_along_axis(box, which, axis=0)
+                corners.append(points @ instance.transform[:, :3].T + instance.transform[:, 3])
+        corners = np.concatenate(corners)
+        return corners.min(axis=0), corners.max(axis=0)
+
+    def default_camera(self):
+        """First camera of the file, else a view of the whole scene from above one corner.
+
+        The up axis is z where the scene is clearly flattest along z (rooms, landscapes), else y (objects).
+        """
+        if self.cameras:
+            return self.cameras[0]
+        lower, upper = self.bounds()
+        extent = upper - lower
+        z_up = extent[2] < 0.7 * extent[:2].min()
+        up = np.array([0.0, 0.0, 1.0] if z_up else [0.0, 1.0, 0.0])
+        towards_eye = np.array([0.6, -1.0, 0.6] if z_up else [0.6, 0.6, 1.0])
+        hfov_deg = 60.0
+        center, radius = (lower + upper) / 2, np.linalg.norm(extent) / 2
+        # 0.75: the sphere has to fit the height of a 4:3 picture too.
+        distance = radius / math.sin(math.atan(0.75 * math.tan(math.radians(hfov_deg / 2))))
+        eye = center + towards_eye / np.linalg.norm(towards_eye) * distance
+        return Camera(eye, center, up, hfov_deg, "whole scene")
+
+    @property
+    def is_animated(self):
+        """True if something in the scene moves."""
+        return self.animation is not None
+
+    @property
+    def duration(self):
+        """Time of the last key frame, in seconds; 0 for a still scene."""
+        return self.animation.duration if self.is_animated else 0.0
+
+    def at_time(self, t):
+        """The same scene with instances and cameras where they are at time ``t``, in seconds.
+
+        Times outside the key frames take the nearest one's value. Meshes are shared, not copied.
+
+        Raises
+        ------
+        SceneError
+            If a transform is singular at that time.
+        """
+        if not self.is_animated:
+            return self
+        transforms, cameras = self.animation.pose(t)
+        instances = [replace(instance, transform=transform)
+                     for instance, transform in zip(self.instances, transforms, strict=True)]
+        return replace(self, instances=instances, cameras=cameras)
