@@ -3,7 +3,7 @@
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
-from amaranth.hdl import Cat, Const, Mux
+from amaranth.hdl import Cat, Const, Mux, Signal
 
 from .operator import (
     BinaryOperator,
@@ -81,9 +81,8 @@ class Adder(BinaryOperator):
     @classmethod
     def _step_delays(cls, fmt):
         return {
-            "compare": carry_delay(fmt.width - 1),
-            "order": lut_delay(1.3),
-            "distance": carry_delay(fmt.exp_width),
+            "compare": carry_delay(fmt.frac_width),
+            "order": lut_delay(2.3),
             **{f"align_{level}": lut_delay(1) for level in _align_levels(fmt)},
             "add": carry_delay(fmt.sig_width + 4),
             **normalise_delays(fmt.sig_width + 4),
@@ -93,42 +92,39 @@ class Adder(BinaryOperator):
     def _compute(self, m, step):
         fmt, a, b = self.fmt, self.a, self.b
         b_sign = ~b.sign if self._subtracts else b.sign
-        s = step("compare",
-                 swap=Cat(a.frac, a.exp) < Cat(b.frac, b.exp),
+        # Both distances and the fractions' order at once: less to wait for than one comparison, then one distance.
+        s = step("compare", a_distance=a.exp - b.exp, b_distance=b.exp - a.exp, below=a.frac < b.frac,
                  a_exp=a.exp, b_exp=b.exp, a_frac=a.frac, b_frac=b.frac, a_sign=a.sign, b_sign=b_sign,
                  any_zero=is_zero(a) | is_zero(b), both_zero=is_zero(a) & is_zero(b),
                  inf=is_inf(a) | is_inf(b), both_inf=is_inf(a) & is_inf(b))
 
-        subtract = s.a_sign ^ s.b_sign
-        invalid = s.both_inf & subtract
+        exp_below = s.a_distance[-1]
+        swap, subtract, invalid = Signal(), Signal(), Signal()
+        m.d.comb += [swap.eq(exp_below | ~s.b_distance[-1] & s.below),
+                     subtract.eq(s.a_sign ^ s.b_sign), invalid.eq(s.both_inf & subtract)]
         s = step("order",
-                 big_exp=Mux(s.swap, s.b_exp, s.a_exp), big_frac=Mux(s.swap, s.b_frac, s.a_frac),
-                 small_exp=Mux(s.swap, s.a_exp, s.b_exp),
-                 small=Mux(s.any_zero, 0, Cat(Mux(s.swap, s.a_frac, s.b_frac), Const(1, 1))),
-                 subtract=subtract, zero=invalid, inf=s.inf & ~invalid,
-                 sign=Mux(s.swap, s.b_sign, s.a_sign) & ~(invalid | s.both_zero & subtract))
-
-        s = step("distance", s, distance=(s.big_exp - s.small_exp)[:fmt.exp_width],
-                 small=Cat(Const(0, 2), s.small), sticky=Const(0))
+                 distance=Mux(exp_below, s.b_distance, s.a_distance)[:fmt.exp_width],
+                 big_exp=Mux(exp_below, s.b_exp, s.a_exp), big_frac=Mux(swap, s.b_frac, s.a_frac),
+                 small=Mux(s.any_zero, 0, Cat(Const(0, 2), Mux(swap, s.a_frac, s.b_frac), Const(1, 1))),
+                 sticky=Const(0), subtract=subtract, zero=invalid, inf=s.inf & ~invalid,
+                 sign=Mux(swap, s.b_sign, s.a_sign) & ~(invalid | s.both_zero & subtract))
 
         for level in _align_levels(fmt):
             places = 1 << level
             far = s.distance[level]
+            small, sticky = Mux(far, s.small >> places, s.small), s.sticky | far & s.small[:places].any()
             if level == _align_levels(fmt)[0]:
                 beyond = (s.distance >> level + 1).any()
-                small = Mux(beyond, 0, Mux(far, s.small >> places, s.small))
-                sticky = Mux(beyond, s.small.any(), far & s.small[:places].any())
-            else:
-                small = Mux(far, s.small >> places, s.small)
-                sticky = s.sticky | far & s.small[:places].any()
+                small, sticky = Mux(beyond, 0, small), Mux(beyond, s.small.any(), sticky)
+            if level == 0:
+                # In the tables of the last shift the complement costs nothing.
+                small = Cat(sticky, small, Const(0, 1)) ^ s.subtract.replicate(fmt.sig_width + 4)
             s = step(f"align_{level}", s, small=small, sticky=sticky)
 
         # One more place for the carry in of a subtraction.
         big = Cat(s.subtract, Const(0, 3), s.big_frac, Const(1, 2))
-        small = Cat(s.subtract, Cat(s.sticky, s.small, Const(0, 1)) ^ s.subtract.replicate(fmt.sig_width + 4))
-        s = step("add", magnitude=(big + small)[1:fmt.sig_width + 5], exp_above=s.big_exp + 2,
+        s = step("add", magnitude=(big + Cat(s.subtract, s.small))[1:fmt.sig_width + 5], exp_above=s.big_exp + 2,
                  subtract=s.subtract, zero=s.zero, inf=s.inf, sign=s.sign)
-
         s = normalise(step, s)
         cancelled = ~s.magnitude[-1] & ~s.inf
         # exp_above - shift - 1, without a carry

@@ -1,9 +1,9 @@
 """Comparison."""
 
-from amaranth.hdl import Cat
+from amaranth.hdl import Cat, Mux
 from amaranth.lib.wiring import In, Out
 
-from .operator import FloatOperator, is_inf, is_zero
+from .operator import FloatOperator, is_zero
 from .pipeline import carry_delay, lut_delay
 
 __all__ = ["Comparator"]
@@ -33,15 +33,16 @@ class Comparator(FloatOperator):
 
     @classmethod
     def _step_delays(cls, fmt):
-        return {"compare": carry_delay(fmt.width - 1), "decide": lut_delay(1)}
+        return {"subtract": carry_delay(fmt.width), "reduce": lut_delay(2), "decide": lut_delay(2)}
 
     def _compute(self, m, step):
         a, b = self.a, self.b
-        # All that is equal whatever its fraction
-        same = is_zero(a) & is_zero(b) | is_inf(a) & is_inf(b)
-        a_magnitude, b_magnitude = Cat(a.frac, a.exp), Cat(b.frac, b.exp)
-        s = step("compare", below=a_magnitude < b_magnitude, same=same | (a_magnitude == b_magnitude),
+        # One carry chain gives both orders: its sign is "less", its zero is "equal".
+        s = step("subtract", difference=Cat(a.frac, a.exp) - Cat(b.frac, b.exp),
                  both_zero=is_zero(a) & is_zero(b), a_sign=a.sign, b_sign=b.sign)
-        eq = s.both_zero | s.same & (s.a_sign == s.b_sign)
-        s = step("decide", eq=eq, lt=~eq & (s.a_sign & ~s.b_sign | (s.a_sign == s.b_sign) & (s.below ^ s.a_sign)))
-        m.d.comb += [self.lt.eq(s.lt), self.eq.eq(s.eq), self.gt.eq(~(s.lt | s.eq))]
+        s = step("reduce", below=s.difference[-1], equal=s.difference[:-1] == 0,
+                 both_zero=s.both_zero, a_sign=s.a_sign, b_sign=s.b_sign)
+        eq = s.both_zero | s.equal & (s.a_sign == s.b_sign)
+        lt = ~eq & Mux(s.a_sign == s.b_sign, s.below ^ s.a_sign, s.a_sign)
+        s = step("decide", lt=lt, eq=eq, gt=~(lt | eq))
+        m.d.comb += [self.lt.eq(s.lt), self.eq.eq(s.eq), self.gt.eq(s.gt)]

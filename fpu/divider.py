@@ -2,7 +2,7 @@
 
 from types import MappingProxyType, SimpleNamespace
 
-from amaranth.hdl import Cat, Const, Mux
+from amaranth.hdl import Cat, Const, Mux, Signal, signed
 
 from .operator import BinaryOperator, is_inf, is_zero, round_and_pack, round_and_pack_delays
 from .pipeline import carry_delay, lut_delay
@@ -56,7 +56,7 @@ class Divider(BinaryOperator):
         delays = {}
         for bit in _quotient_bits(fmt):
             delays[f"subtract_{bit}"] = carry_delay(fmt.sig_width + 1)
-            delays[f"restore_{bit}"] = lut_delay(1)
+            delays[f"restore_{bit}"] = lut_delay(1.3)
         del delays["restore_0"]
         return delays | round_and_pack_delays(fmt)
 
@@ -64,20 +64,26 @@ class Divider(BinaryOperator):
         fmt, a, b = self.fmt, self.a, self.b
         zero = is_zero(a) | is_inf(b)
         inf = is_inf(a) | is_zero(b)
-        s = SimpleNamespace(remainder=Cat(a.frac, Const(1, 2)), divisor=Cat(b.frac, Const(1, 1)), quotient=Const(0, 0),
-                            exp=a.exp - b.exp + (fmt.bias - 1),
+        # Of a quotient below 1 this is one too many
+        above = fmt.exp_width - 1
+        exp_distance = Signal(signed(fmt.exp_width + 1))
+        exp = Signal(signed(fmt.exp_width + 2))
+        m.d.comb += [exp_distance.eq(Cat(a.exp, 0, 0).as_signed() + (~Cat(b.exp, 0)).as_signed()),
+                     exp.eq(Cat(exp_distance[:above], exp_distance[above:].as_signed() + 1))]
+        # The remainder is kept complemented: ~(r - d) = ~r + d is a carry chain that begins without a carry.
+        s = SimpleNamespace(remainder=~Cat(a.frac, Const(1, 2)), divisor=Cat(b.frac, Const(1, 1)),
+                            quotient=Const(0, 0), exp=exp,
                             zero=zero, inf=inf & ~zero, sign=(a.sign ^ b.sign) & ~(zero & inf))
 
         for bit in _quotient_bits(fmt):
-            s = step(f"subtract_{bit}", s, difference=(s.remainder - s.divisor)[:fmt.sig_width + 1])
-            # The remainder is less than twice the divisor: the difference's sign is its top bit.
-            below = s.difference[-1]
-            quotient = Cat(~below, s.quotient)
+            s = step(f"subtract_{bit}", s, difference=(s.remainder + s.divisor)[:fmt.sig_width + 1])
+            fits = s.difference[-1]
+            quotient = Cat(fits, s.quotient)
             if bit:
-                remainder = Mux(below, s.remainder, s.difference)[:fmt.sig_width]
-                s = step(f"restore_{bit}", s, remainder=Cat(Const(0, 1), remainder), quotient=quotient)
+                remainder = Mux(fits, s.difference, s.remainder)[:fmt.sig_width]
+                s = step(f"restore_{bit}", s, remainder=Cat(Const(1, 1), remainder), quotient=quotient)
 
         # A quotient is never halfway between two members, so what remains does not matter.
-        s = SimpleNamespace(sig=quotient, sticky=Const(1), exp=s.exp, exp_carried=s.exp + 1,
+        s = SimpleNamespace(sig=quotient, sticky=Const(1), exp=s.exp - 1, exp_carried=s.exp,
                             zero=s.zero, inf=s.inf, sign=s.sign)
         m.d.comb += self.r.eq(round_and_pack(step, s, fmt=fmt, rounding=self.rounding))

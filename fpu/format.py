@@ -15,8 +15,9 @@ __all__ = ["FloatFormat"]
 class FloatFormat(ShapeCastable):
     """Shape of a floating-point number, value = (-1)^sign * 2^(exp - bias) * (1 + frac / 2^frac_width).
 
-    A stored exponent of zero is zero and one of all ones is infinity, whatever the fraction, both with their sign.
-    There are no subnormals and no NaN. Operators and :meth:`encode` give zeros and infinities a fraction of 0.
+    A stored exponent of zero is zero, whatever the fraction, and one of all ones is infinity, both with their sign.
+    There are no subnormals and no NaN. All that makes numbers gives zeros and infinities a fraction of 0, and
+    comparators take it for granted of infinities.
 
     A signal of this shape is a :class:`amaranth.lib.data.View` with the fields ``frac``, ``exp``, ``sign``, from
     the least significant bit up; its initial value and its value in a testbench are Python floats.

@@ -2,10 +2,11 @@
 
 from types import MappingProxyType, SimpleNamespace
 
-from amaranth.hdl import Cat, Const
+from amaranth.hdl import Cat, Const, Signal, signed
 
 from .operator import BinaryOperator, is_inf, is_zero, round_and_pack, round_and_pack_delays
 from .pipeline import product_delay
+from .product import Product
 from .rounding import Rounding, emulated, round_nearest, round_truncate
 
 __all__ = ["Multiplier", "multiply", "multiply_truncate"]
@@ -52,11 +53,16 @@ class Multiplier(BinaryOperator):
         zero = is_zero(a) | is_zero(b)
         inf = is_inf(a) | is_inf(b)
         # Zeros take part with a hidden bit; `zero` overrides what comes of it, so the block waits for no logic.
-        s = step("multiply",
-                 product=Cat(a.frac, Const(1, 1)) * Cat(b.frac, Const(1, 1)),
-                 exp=a.exp + b.exp - fmt.bias,
+        m.submodules.significand = significand = Product(fmt.sig_width, cycles=step.next_registers)
+        m.d.comb += [significand.a.eq(Cat(a.frac, Const(1, 1))), significand.b.eq(Cat(b.frac, Const(1, 1)))]
+        s = step("multiply", exp_sum=(Cat(Const(1, 1), a.exp) + Cat(Const(1, 1), b.exp))[1:],
                  zero=zero, inf=inf & ~zero, sign=(a.sign ^ b.sign) & ~(zero & inf))
+
+        # The bias is one less than a power of two: that one went in as a carry, the power is the upper bits'.
+        above = fmt.exp_width - 1
+        exp = Signal(signed(fmt.exp_width + 2))
+        m.d.comb += exp.eq(Cat(s.exp_sum[:above], s.exp_sum[above:] - 1))
         below = fmt.sig_width - 2
-        s = SimpleNamespace(sig=s.product[below:], sticky=s.product[:below].any(), exp=s.exp, exp_carried=s.exp + 1,
-                            zero=s.zero, inf=s.inf, sign=s.sign)
+        s = SimpleNamespace(sig=significand.p[below:], sticky=significand.p[:below].any(),
+                            exp=exp, exp_carried=exp + 1, zero=s.zero, inf=s.inf, sign=s.sign)
         m.d.comb += self.r.eq(round_and_pack(step, s, fmt=fmt, rounding=self.rounding))

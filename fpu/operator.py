@@ -140,11 +140,11 @@ def round_and_pack(step, s, *, fmt, rounding):
     above_two = s.sig[-1]
     # A tie clears the lowest kept bit
     frac = Mux(above_two, Cat(s.sig[2] & ~s.tie, s.sig[3:-1]), Cat(s.sig[1] & ~s.tie, s.sig[2:-2]))
-    zero, inf = [], []
-    for exp in (s.exp, s.exp_carried):
-        zero.append(s.zero | ~s.inf & (exp <= 0))
-        inf.append(s.inf | ~s.zero & (exp >= fmt.exp_inf))
-    zero, inf = Mux(above_two, zero[1], zero[0]), Mux(above_two, inf[1], inf[0])
+    # Bit by bit, each of whichever exponent makes it cheap: a comparison would become a carry chain.
+    under = s.exp[-1] | ~above_two & (s.exp == 0)
+    over = ~s.exp_carried[-1] & s.exp_carried[fmt.exp_width:-1].any()
+    over |= above_two & (s.exp_carried == fmt.exp_inf)
+    zero, inf = s.zero | ~s.inf & under, s.inf | ~s.zero & over
     finite = Mux(above_two, s.exp_carried, s.exp)[:fmt.exp_width]
     exp = Mux(inf, fmt.exp_inf, Mux(zero, 0, finite))
     return step("pack", r=Cat(Mux(inf | zero, 0, frac), exp, s.sign)).r

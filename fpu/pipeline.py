@@ -8,8 +8,8 @@ __all__ = ["Pipeline", "balance", "carry_delay", "depth_for", "lut_delay", "prod
 
 
 # Of an ECP5 of speed grade 6, in ns, each with the routing before it.
-_LUT_DELAY = 0.95
-_CARRY_ENTRY_DELAY = 1.6
+_LUT_DELAY = 1.05
+_CARRY_ENTRY_DELAY = 2.0
 _CARRY_BIT_DELAY = 0.035
 #: What a clock of 175 MHz leaves to logic between two registers.
 _STAGE_DELAY = 5.2
@@ -92,6 +92,11 @@ class Pipeline:
     def __init__(self, m, *, weights, latency):
         self._m = m
         self._remaining = list(zip(weights, balance(list(weights.values()), latency=latency), strict=True))
+
+    @property
+    def next_registers(self):
+        """Registers that follow the next step to be ended, for a step that brings its own."""
+        return self._remaining[0][1]
 
     def __call__(self, name, carried=None, /, **results):
         """End the step ``name``: its ``results``, and what is ``carried`` from before, as attributes."""

@@ -124,17 +124,20 @@ struct Bench {
         chip->final();
     }
 
+    // The falling edge comes first: it is when the chip's logic sees what was set since the last rising edge.
     void tick() {
-        chip->clk = 1;
-        chip->eval();
-#if BENCH_TRACE
-        if (trace && cycle >= trace_from && cycle < trace_to) trace->dump(10 * cycle + 5);
-#endif
         chip->clk = 0;
         chip->eval();
+        dump(10 * cycle);
+        chip->clk = 1;
+        chip->eval();
+        dump(10 * cycle + 5);
         ++cycle;
+    }
+
+    void dump(uint64_t time) {
 #if BENCH_TRACE
-        if (trace && cycle >= trace_from && cycle < trace_to) trace->dump(10 * cycle);
+        if (trace && cycle >= trace_from && cycle < trace_to) trace->dump(time);
 #endif
     }
 

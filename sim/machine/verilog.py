@@ -1,11 +1,16 @@
 """A component as Verilog, each of its members a port."""
 
+import re
+
 from amaranth.back import verilog
 from amaranth.hdl import Const, ValueCastable
 from amaranth.hdl._ir import PortDirection
 from amaranth.lib import wiring
 
 __all__ = ["component_verilog"]
+
+_INITIAL = re.compile(r"^  initial begin\n.*?^  end\n", re.MULTILINE | re.DOTALL)
+_ZERO = re.compile(r"^ +\S+ ?\[\d+\] = \d+'h0+;\n", re.MULTILINE)
 
 
 def component_verilog(component, *, name):
@@ -21,4 +26,6 @@ def component_verilog(component, *, name):
         if not isinstance(value, Const):
             direction = PortDirection.Input if member.flow == wiring.In else PortDirection.Output
             ports["_".join(map(str, path))] = (value, direction)
-    return verilog.convert(component, name=name, ports=ports, emit_src=False, strip_internal_attrs=True)
+    text = verilog.convert(component, name=name, ports=ports, emit_src=False, strip_internal_attrs=True)
+    # A simulator's memories are zero anyhow, and a line for each word is most of what would have to be compiled.
+    return _INITIAL.sub(lambda block: _ZERO.sub("", block[0]), text)

@@ -18,7 +18,7 @@ from .scene import DEFAULT_MATERIAL, IDENTITY, Instance, Mesh, Scene
 
 __all__ = ["load_obj"]
 
-_CORNER = re.compile(rb"[+-]?\d+(/([+-]?\d+)?(/[+-]?\d+)?)?")
+_CORNER = re.compile(rb"[+-]?\d{1,18}(/([+-]?\d{1,18})?(/[+-]?\d{1,18})?)?")
 _MAX_KEY = 8
 
 

@@ -164,9 +164,9 @@ def _fan(path, faces, num_vertices):
     else:
         triangles = np.array([(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)],
                              dtype=np.int64).reshape(-1, 3)
-    bad = np.flatnonzero(((triangles < 0) | (triangles >= num_vertices)).any(axis=1))
-    if bad.size:
-        raise SceneError(f"{path}: triangle {bad[0]} uses vertex {triangles[bad[0]].max()}; "
+    bad = (triangles < 0) | (triangles >= num_vertices)
+    if bad.any():
+        raise SceneError(f"{path}: triangle {np.argwhere(bad)[0, 0]} uses vertex {triangles[bad][0]}; "
                          f"there are {num_vertices}, numbered from 0")
     return triangles.astype(np.int32)
 

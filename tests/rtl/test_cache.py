@@ -10,7 +10,7 @@ from tests.bench import simulate
 
 def run_cache(*, seed, num_lines, line_items, item_width, num_fetches, gap, latency, indices):
     rng = random.Random(seed)
-    num_waiting = 8
+    num_waiting = 7
     dut = Cache(item_width=item_width, payload_shape=16, index_width=12, num_lines=num_lines,
                 line_items=line_items, num_fetches=num_fetches, num_waiting=num_waiting)
     item_words = -(-item_width // 32)

@@ -1,0 +1,137 @@
+"""The operators' hardware and emulation against exact fractions and numpy's floats."""
+
+import numpy as np
+import pytest
+
+from fpu import Adder, Comparator, Divider, FloatFormat, Multiplier, Rounding, Subtractor
+from tests.fpu import reference
+from tests.fpu.verilated import Bank
+
+TINY, TINIEST = FloatFormat(3, 2), FloatFormat(2, 3)
+DEFAULT = FloatFormat(7, 16)
+NUMPY = {FloatFormat(5, 10): np.float16, FloatFormat(8, 23): np.float32}
+EXACT = {Adder: reference.add, Subtractor: reference.subtract, Multiplier: reference.multiply,
+         Divider: reference.divide}
+# One more than the steps there are to put registers behind
+MAX_LATENCY = {Adder: 15, Multiplier: 4, Divider: 13, Comparator: 3}
+
+
+@pytest.fixture(scope="session")
+def bank(tmp_path_factory):
+    operators = [cls(TINY, latency=latency) for cls, most in MAX_LATENCY.items() for latency in range(most + 1)]
+    for cls in EXACT:
+        operators += [cls(TINY, latency=latency, rounding=Rounding.TRUNCATE) for latency in (0, None)]
+        operators += [cls(TINIEST, rounding=rounding) for rounding in Rounding]
+        operators += [cls(DEFAULT, rounding=rounding) for rounding in Rounding]
+        operators += [cls(fmt) for fmt in NUMPY]
+    operators += [Subtractor(TINY), *(Comparator(fmt) for fmt in (TINIEST, DEFAULT, *NUMPY))]
+    return Bank(operators, tmp_path_factory.mktemp("bank"))
+
+
+def all_pairs(fmt):
+    bits = np.arange(1 << fmt.width)
+    # Infinity has one pattern of each sign.
+    bits = bits[(bits >> fmt.frac_width & fmt.exp_inf != fmt.exp_inf) | (bits & (1 << fmt.frac_width) - 1 == 0)]
+    return [operand.ravel() for operand in np.meshgrid(bits, bits)]
+
+
+def structured_pairs(fmt, *, count, seed):
+    """Pairs of members: far and near exponents, near cancellation, long runs of ones, special values."""
+    rng = np.random.default_rng(seed)
+    frac_mask = (1 << fmt.frac_width) - 1
+
+    def fractions():
+        runs = frac_mask >> rng.integers(0, fmt.frac_width + 1, count) << rng.integers(0, fmt.frac_width + 1, count)
+        return np.choose(rng.integers(0, 3, count), [rng.integers(0, frac_mask + 1, count), runs & frac_mask,
+                                                     frac_mask - (runs & frac_mask)])
+
+    def floats(exp):
+        exp = np.clip(exp, 0, fmt.exp_inf)
+        frac = np.where((exp == 0) | (exp == fmt.exp_inf), 0, fractions())
+        return rng.integers(0, 2, count) << fmt.width - 1 | exp << fmt.frac_width | frac
+
+    a_exp = rng.integers(0, fmt.exp_inf + 1, count)
+    near = a_exp + rng.integers(-2, 3, count)
+    aligned = a_exp + rng.integers(-fmt.frac_width - 4, fmt.frac_width + 5, count)
+    b_exp = np.choose(rng.integers(0, 4, count), [near, aligned, 2 * fmt.bias - near,
+                                                  rng.integers(0, fmt.exp_inf + 1, count)])
+    a, b = floats(a_exp), floats(b_exp)
+    close = rng.integers(0, 8, count) == 0
+    b = np.where(close & (a & frac_mask > 3) & (a & frac_mask < frac_mask - 3),
+                 (a ^ rng.integers(0, 2, count) << fmt.width - 1) + rng.integers(-3, 4, count), b)
+    return a, b
+
+
+def expected(cls, rounding, a, b, fmt):
+    parameters = fmt.exp_width, fmt.frac_width
+    pairs = zip(a.tolist(), b.tolist(), strict=True)
+    if cls is Comparator:
+        return np.array([reference.order(*pair, *parameters) for pair in pairs])
+    truncate = rounding is Rounding.TRUNCATE
+    return np.array([EXACT[cls](*pair, *parameters, truncate=truncate) for pair in pairs])
+
+
+def check(bank, a, b, fmt):
+    known = {}
+    results = bank.run(a, b, fmt=fmt)
+    assert results
+    for operator, got in results:
+        key = type(operator), operator.rounding
+        if key not in known:
+            known[key] = expected(*key, a, b, fmt)
+        wrong = np.flatnonzero(got != known[key])
+        assert not wrong.size, (
+            f"{type(operator).__name__} {fmt} {operator.rounding} latency {operator.latency}: {wrong.size} wrong, "
+            f"{[tuple(hex(x[i]) for x in (a, b, got, known[key])) for i in wrong[:4]]}")
+
+
+@pytest.mark.parametrize("fmt", [TINY, TINIEST], ids=str)
+def test_every_pair(bank, fmt):
+    check(bank, *all_pairs(fmt), fmt)
+
+
+def test_structured_pairs(bank):
+    check(bank, *structured_pairs(DEFAULT, count=6_000, seed=1), DEFAULT)
+
+
+@pytest.mark.parametrize(("fmt", "dtype"), NUMPY.items(), ids=str)
+def test_numpy(bank, fmt, dtype):
+    a, b = structured_pairs(fmt, count=20_000, seed=2)
+    x, y = fmt.decode(a).astype(dtype), fmt.decode(b).astype(dtype)
+    assert (x == fmt.decode(a)).all()
+    with np.errstate(all="ignore"):
+        want = {Adder: x + y, Subtractor: x - y, Multiplier: x * y, Divider: x / y,
+                Comparator: 1 * (x < y) + 2 * (x == y) + 4 * (x > y)}
+    for operator, got in bank.run(a, b, fmt=fmt):
+        result = want[type(operator)]
+        if isinstance(operator, Comparator):
+            assert (got == result).all()
+            continue
+        got = fmt.decode(got)
+        result = np.where(np.isnan(result), dtype(0), result).astype(np.float64)
+        # numpy keeps subnormals. At the smallest normal it may have come by rounding up a subnormal, or not.
+        assert (got[np.abs(result) < fmt.min_normal] == 0).all()
+        normal = np.abs(result) > fmt.min_normal
+        assert normal.sum() > 1000
+        assert (got[normal] == result[normal]).all()
+        assert (np.signbit(got) == np.signbit(result))[result != 0].all()
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+@pytest.mark.parametrize("cls", EXACT)
+@pytest.mark.parametrize(("fmt", "pairs"), [
+    (TINY, all_pairs(TINY)), (TINIEST, all_pairs(TINIEST)),
+    (DEFAULT, structured_pairs(DEFAULT, count=3_000, seed=3)),
+    (FloatFormat(8, 23), structured_pairs(FloatFormat(8, 23), count=3_000, seed=4)),
+], ids=["3.2", "2.3", "7.16", "8.23"])
+def test_emulation(cls, rounding, fmt, pairs):
+    a, b = pairs
+    emulate = cls.emulation[rounding]
+    got = [emulate(fmt.params, *pair) for pair in zip(fmt.decode(a).tolist(), fmt.decode(b).tolist(), strict=True)]
+    assert (fmt.encode(np.array(got)) == expected(cls, rounding, a, b, fmt)).all()
+    assert (fmt.quantize(got) == got).all()
+
+
+def test_negative_latency():
+    with pytest.raises(ValueError, match="Latency"):
+        Adder(DEFAULT, latency=-1)
