@@ -82,7 +82,7 @@ class Adder(BinaryOperator):
     def _step_delays(cls, fmt):
         return {
             "compare": carry_delay(fmt.frac_width),
-            "order": lut_delay(2.3),
+            "order": lut_delay(3),
             **{f"align_{level}": lut_delay(1) for level in _align_levels(fmt)},
             "add": carry_delay(fmt.sig_width + 4),
             **normalise_delays(fmt.sig_width + 4),

@@ -19,8 +19,9 @@ class Delay(wiring.Component):
         Shape of the value.
     cycles : int
         Cycles from ``i`` to ``o``; none is a wire.
-    memory_from : int
-        Cycles from which on a memory is used, at least 2.
+    memory_from : int or None
+        Cycles from which on a memory is used, at least 2. By default 5, and 17 for less than four bits, where a memory
+        of ECP5, 16 deep and 4 wide, and its counter save nothing.
 
     Members
     -------
@@ -35,9 +36,11 @@ class Delay(wiring.Component):
         If ``cycles`` is negative or ``memory_from`` is less than 2.
     """
 
-    def __init__(self, shape, *, cycles, memory_from=5):
+    def __init__(self, shape, *, cycles, memory_from=None):
         if cycles < 0:
             raise ValueError(f"Delay must not be negative, but is {cycles!r} cycles")
+        if memory_from is None:
+            memory_from = 5 if Shape.cast(shape).width >= 4 else 17
         if memory_from < 2:
             raise ValueError(f"A memory delays by at least 2 cycles, not {memory_from!r}")
         self.cycles = cycles

@@ -59,11 +59,11 @@ def kernel_source(datapath, *, cache):
             lines.append(f"    {names[node]} = {_expression(node, names)}")
     outputs = [f"out_{name}" for name in datapath.output_names]
     results = "".join(f"{names[node]}, " for node in datapath.outputs.values())
+    elements = ["params", *(f"{name}[index]" for name in inputs)]
     lines += [f"    return ({results})", "", "", decorator,
               f"def sweep({', '.join(['params', *inputs, *outputs])}):",
               f"    for index in range({outputs[0]}.size):",
-              f"        {''.join(f'{output}[index], ' for output in outputs)}= "
-              f"kernel({', '.join(['params', *(f'{name}[index]' for name in inputs)])})", ""]
+              f"        {''.join(f'{output}[index], ' for output in outputs)}= kernel({', '.join(elements)})", ""]
     return "\n".join(lines)
 
 
@@ -108,5 +108,5 @@ def compile_kernel(datapath):
         return _load_kept(kernel_source(datapath, cache=True))
     except OSError:
         functions = {}
-        exec(kernel_source(datapath, cache=False), functions)
+        exec(kernel_source(datapath, cache=False), functions)  # noqa: S102
         return SimpleNamespace(kernel=functions["kernel"], sweep=functions["sweep"])

@@ -31,7 +31,8 @@ class Operator(wiring.Component):
     fmt : FloatFormat
         Format of operands and result.
     latency : int or None
-        Registers on the way, from 0 (combinational). By default as many as 175 MHz on an ECP5 of grade 6 takes.
+        Registers on the way, from 0 (combinational); more than there are steps follow the result. By default as
+        many as 175 MHz on an ECP5 of grade 6 takes.
     rounding : Rounding
         How the result is fitted to the format.
     members : dict
@@ -90,7 +91,7 @@ class FloatOperator(Operator):
 class BinaryOperator(FloatOperator):
     """Operator on two floats, ``a`` and ``b``, with a float result ``r``."""
 
-    #: Compiled emulation by rounding: ``f(fmt.params, a, b)``, exact, on float64 values that are members of the format.
+    #: Compiled emulation by rounding: ``f(fmt.params, a, b)``, exact, on float64 values that are members.
     emulation = None
 
     def __init__(self, fmt, *, latency=None, rounding=Rounding.NEAREST_EVEN):
@@ -99,7 +100,8 @@ class BinaryOperator(FloatOperator):
 
 def normalise_delays(width):
     """Delays of the steps of :func:`normalise` on ``width`` bits."""
-    return {f"normalise_{level}": lut_delay(2 + level // 4) for level in range((width - 1).bit_length())[::-1]}
+    # A tree of tables that looks at 2^level bits, and the one that shifts.
+    return {f"normalise_{level}": lut_delay((level + 1) // 2 + 1) for level in range((width - 1).bit_length())[::-1]}
 
 
 def normalise(step, s):
@@ -116,7 +118,7 @@ def normalise(step, s):
 
 def round_and_pack_delays(fmt):
     """Delays of the steps of :func:`round_and_pack`."""
-    return {"round": carry_delay(fmt.sig_width + 2), "pack": lut_delay(4)}
+    return {"round": carry_delay(fmt.sig_width + 2), "range": lut_delay(3), "pack": lut_delay(1.5)}
 
 
 def round_and_pack(step, s, *, fmt, rounding):
@@ -138,13 +140,15 @@ def round_and_pack(step, s, *, fmt, rounding):
              zero=s.zero, inf=s.inf, sign=s.sign)
 
     above_two = s.sig[-1]
-    # A tie clears the lowest kept bit
-    frac = Mux(above_two, Cat(s.sig[2] & ~s.tie, s.sig[3:-1]), Cat(s.sig[1] & ~s.tie, s.sig[2:-2]))
     # Bit by bit, each of whichever exponent makes it cheap: a comparison would become a carry chain.
     under = s.exp[-1] | ~above_two & (s.exp == 0)
     over = ~s.exp_carried[-1] & s.exp_carried[fmt.exp_width:-1].any()
     over |= above_two & (s.exp_carried == fmt.exp_inf)
-    zero, inf = s.zero | ~s.inf & under, s.inf | ~s.zero & over
-    finite = Mux(above_two, s.exp_carried, s.exp)[:fmt.exp_width]
-    exp = Mux(inf, fmt.exp_inf, Mux(zero, 0, finite))
-    return step("pack", r=Cat(Mux(inf | zero, 0, frac), exp, s.sign)).r
+    s = step("range", sig=s.sig, tie=s.tie, sign=s.sign,
+             exp=Mux(above_two, s.exp_carried, s.exp)[:fmt.exp_width],
+             zero=s.zero | ~s.inf & under, inf=s.inf | ~s.zero & over)
+
+    above_two = s.sig[-1]
+    frac = Mux(above_two, Cat(s.sig[2] & ~s.tie, s.sig[3:-1]), Cat(s.sig[1] & ~s.tie, s.sig[2:-2]))
+    exp = Mux(s.inf, fmt.exp_inf, Mux(s.zero, 0, s.exp))
+    return step("pack", r=Cat(Mux(s.inf | s.zero, 0, frac), exp, s.sign)).r

@@ -1,14 +1,17 @@
-"""A bounding volume hierarchy by the binned surface-area heuristic (Wald: On fast construction of SAH-based BVHs, 2007)."""
+"""A bounding volume hierarchy by the binned surface-area heuristic (Wald: On fast construction of SAH-based BVHs, RT 2007)."""
 
 from typing import NamedTuple
 
 import numba
 import numpy as np
 
-__all__ = ["Bvh", "build_bvh"]
+__all__ = ["MAX_DEPTH", "Bvh", "build_bvh"]
 
 _NUM_BINS = 16
 _MAX_LEAF = 4
+# From this depth on nodes are halved by number: the heuristic alone can peel primitives off one by one.
+_MAX_SAH_DEPTH = 64
+MAX_DEPTH = _MAX_SAH_DEPTH + 32
 
 
 class Bvh(NamedTuple):
@@ -40,7 +43,7 @@ def _half_area(lower, upper):
 
 
 @numba.njit(cache=True)
-def _find_split(lower, upper, items, node_lower, node_upper):
+def _find_split(lower, upper, items):
     """(axis, bin edge, scale, offset) of the cheapest split by centroid bins; axis −1 if centroids coincide."""
     best_cost, best = np.inf, (-1, 0, 0.0, 0.0)
     bin_lower = np.empty((_NUM_BINS, 3))
@@ -69,7 +72,8 @@ def _find_split(lower, upper, items, node_lower, node_upper):
             cost_above[b] = num * _half_area(run_lower, run_upper) if num else np.inf
         run_lower, run_upper, num = np.full(3, np.inf), np.full(3, -np.inf), 0
         for b in range(1, _NUM_BINS):
-            run_lower, run_upper = np.minimum(run_lower, bin_lower[b - 1]), np.maximum(run_upper, bin_upper[b - 1])
+            run_lower = np.minimum(run_lower, bin_lower[b - 1])
+            run_upper = np.maximum(run_upper, bin_upper[b - 1])
             num += bin_count[b - 1]
             if num and num * _half_area(run_lower, run_upper) + cost_above[b] < best_cost:
                 best_cost = num * _half_area(run_lower, run_upper) + cost_above[b]
@@ -82,10 +86,10 @@ def _build(lower, upper, items):
     n = len(items)
     node_lower, node_upper = np.empty((2 * n, 3)), np.empty((2 * n, 3))
     first, count = np.zeros(2 * n, np.int32), np.zeros(2 * n, np.int32)
-    waiting = [(0, 0, n)]
+    waiting = [(0, 0, n, 0)]
     num_nodes = 1
     while len(waiting):
-        node, start, end = waiting.pop()
+        node, start, end, depth = waiting.pop()
         for k in range(3):
             node_lower[node, k], node_upper[node, k] = np.inf, -np.inf
         for item in items[start:end]:
@@ -95,8 +99,8 @@ def _build(lower, upper, items):
         first[node], count[node] = start, end - start
         if end - start <= _MAX_LEAF:
             continue
-        axis, edge, scale, offset = _find_split(lower, upper, items[start:end], node_lower[node], node_upper[node])
-        if axis < 0:
+        axis, edge, scale, offset = _find_split(lower, upper, items[start:end])
+        if axis < 0 or depth >= _MAX_SAH_DEPTH:
             middle = (start + end) // 2
         else:
             middle = start
@@ -106,8 +110,8 @@ def _build(lower, upper, items):
                     items[i], items[middle] = items[middle], item
                     middle += 1
         first[node], count[node] = num_nodes, 0
-        waiting.append((num_nodes, start, middle))
-        waiting.append((num_nodes + 1, middle, end))
+        waiting.append((num_nodes, start, middle, depth + 1))
+        waiting.append((num_nodes + 1, middle, end, depth + 1))
         num_nodes += 2
     return node_lower[:num_nodes], node_upper[:num_nodes], first[:num_nodes], count[:num_nodes]
 

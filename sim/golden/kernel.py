@@ -5,14 +5,14 @@ at an edge compute its edge function from the same numbers, exactly negated, so 
 Boxes are widened as by Ize: Robust BVH ray traversal, JCGT 2013.
 """
 
-import math
-
 import numba
 import numpy as np
 
+from .bvh import MAX_DEPTH
+
 __all__ = ["trace_rays"]
 
-_STACK_DEPTH = 128
+_STACK_DEPTH = MAX_DEPTH + 1
 # Bound on the relative error of the slab distances, on the far side: 1 + 2·gamma(3) and some.
 _WIDEN = 1.0 + 8 * 2.0 ** -53
 
@@ -54,10 +54,26 @@ def _hit_triangle(corners, origin, kx, ky, kz, sx, sy, sz):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _trace_mesh(origin, direction, t_min, best, nodes, corners, node_base, item_base, triangle_base, instance_id,
-                excluded, stack):
+def _next_node(node, base, lower, upper, first, origin, inverse, t_far, stack, num_waiting):
+    """Put those children of an inner node on the stack that the ray enters, the nearer one on top."""
+    child = base + first[node]
+    t0 = _enters(lower[child], upper[child], origin, inverse, t_far)
+    t1 = _enters(lower[child + 1], upper[child + 1], origin, inverse, t_far)
+    near = 0 if t0 <= t1 else 1
+    if max(t0, t1) < np.inf:
+        stack[num_waiting] = child + 1 - near
+        num_waiting += 1
+    if min(t0, t1) < np.inf:
+        stack[num_waiting] = child + near
+        num_waiting += 1
+    return num_waiting
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _trace_mesh(origin, direction, t_min, best, nodes, corners, bases, instance_id, excluded, inverse, stack):
     """Improve ``best`` = (t, u, v, instance_id, prim_id) by the triangles of one instance, ray in object space."""
     lower, upper, first, count, items = nodes
+    node_base, item_base, triangle_base = bases[0], bases[1], bases[2]
     kz = 0
     for k in (1, 2):
         if abs(direction[k]) > abs(direction[kz]):
@@ -66,48 +82,63 @@ def _trace_mesh(origin, direction, t_min, best, nodes, corners, node_base, item_
         return best
     kx, ky = (kz + 1) % 3, (kz + 2) % 3
     sx, sy, sz = direction[kx] / direction[kz], direction[ky] / direction[kz], 1.0 / direction[kz]
-    inverse = 1.0 / direction
-    stack[0] = 0
+    for k in range(3):
+        inverse[k] = 1.0 / direction[k]
+    stack[0] = node_base
     num_waiting = 1
     while num_waiting:
         num_waiting -= 1
-        node = node_base + stack[num_waiting]
+        node = stack[num_waiting]
         if _enters(lower[node], upper[node], origin, inverse, best[0]) == np.inf:
             continue
         if not count[node]:
-            # The nearer child is taken next; ties in distance do not matter for the result.
-            child = node_base + first[node]
-            t0 = _enters(lower[child], upper[child], origin, inverse, best[0])
-            t1 = _enters(lower[child + 1], upper[child + 1], origin, inverse, best[0])
-            far = 1 if t0 <= t1 else 0
-            for which, t in ((far, t1 if far else t0), (1 - far, t0 if far else t1)):
-                if t < np.inf:
-                    stack[num_waiting] = first[node] + which
-                    num_waiting += 1
+            num_waiting = _next_node(node, node_base, lower, upper, first, origin, inverse, best[0], stack,
+                                     num_waiting)
             continue
         for i in range(first[node], first[node] + count[node]):
             prim_id = items[item_base + i]
             if instance_id == excluded[0] and prim_id == excluded[1]:
                 continue
             t, u, v = _hit_triangle(corners[triangle_base + prim_id], origin, kx, ky, kz, sx, sy, sz)
-            if t_min < t < np.inf and (t < best[0] or t == best[0] and (
-                    instance_id < best[3] or instance_id == best[3] and prim_id < best[4])):
+            if t_min < t < np.inf and (t < best[0] or (t == best[0] and (
+                    instance_id < best[3] or (instance_id == best[3] and prim_id < best[4])))):
                 best = (t, u, v, instance_id, prim_id)
     return best
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _unit_normal(corners):
-    a, b = corners[1] - corners[0], corners[2] - corners[0]
-    # Scaled first, so that tiny triangles' products do not underflow.
-    a, b = a / np.abs(a).max(), b / np.abs(b).max()
-    normal = np.array((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
-    return normal / math.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+def _trace_ray(origin, direction, t_min, excluded, top, inverses, bases, nodes, corners):
+    """Closest hit of one ray: (t, u, v, instance_id, prim_id)."""
+    lower, upper, first, count, items = top
+    best = (np.inf, 0.0, 0.0, np.int64(-1), np.int64(-1))
+    stack, mesh_stack = np.empty(_STACK_DEPTH, np.int32), np.empty(_STACK_DEPTH, np.int32)
+    inverse, mesh_inverse = np.empty(3), np.empty(3)
+    mesh_origin, mesh_direction = np.empty(3), np.empty(3)
+    for k in range(3):
+        inverse[k] = 1.0 / direction[k]
+    stack[0] = 0
+    num_waiting = min(1, len(first))
+    while num_waiting:
+        num_waiting -= 1
+        node = stack[num_waiting]
+        if _enters(lower[node], upper[node], origin, inverse, best[0]) == np.inf:
+            continue
+        if not count[node]:
+            num_waiting = _next_node(node, 0, lower, upper, first, origin, inverse, best[0], stack, num_waiting)
+            continue
+        for i in range(first[node], first[node] + count[node]):
+            instance = items[i]
+            m = inverses[instance]
+            for k in range(3):
+                mesh_direction[k] = m[k, 0] * direction[0] + m[k, 1] * direction[1] + m[k, 2] * direction[2]
+                mesh_origin[k] = m[k, 0] * origin[0] + m[k, 1] * origin[1] + m[k, 2] * origin[2] + m[k, 3]
+            best = _trace_mesh(mesh_origin, mesh_direction, t_min, best, nodes, corners, bases[instance],
+                               np.int64(instance), excluded, mesh_inverse, mesh_stack)
+    return best
 
 
-@numba.njit(cache=True, parallel=True, error_model="numpy")
-def trace_rays(origins, directions, t_min, excluded_instance, excluded_prim, top, inverses, mesh_of, bases, nodes, corners,
-               instance_ids, prim_ids, ts, us, vs, dots):
+@numba.njit(cache=True, parallel=True)
+def trace_rays(origins, directions, t_min, excluded, top, inverses, bases, nodes, corners, ids, distances):
     """Closest hit of every ray; ties go to the lowest (instance_id, prim_id).
 
     Parameters
@@ -115,59 +146,24 @@ def trace_rays(origins, directions, t_min, excluded_instance, excluded_prim, top
     origins, directions : float64[N, 3]
     t_min : float
         Hits at t ≤ t_min do not count.
-    excluded_instance, excluded_prim : int32[N]
-        A triangle that the ray ignores, −1 for none.
+    excluded : int32[2, N]
+        instance_id and prim_id of a triangle that the ray ignores, −1 for none.
     top : Bvh
         Over the instances' world boxes.
     inverses : float64[I, 3, 4]
         World to object space.
-    mesh_of : int32[I]
-    bases : int64[M, 3]
-        Where a mesh's nodes, items and triangles start in ``nodes`` and ``corners``.
+    bases : int64[I, 3]
+        Where the nodes, items and triangles of an instance's mesh start in ``nodes`` and ``corners``.
     nodes : Bvh
         All meshes' hierarchies, one after the other.
     corners : float64[T, 3, 3]
-    instance_ids, prim_ids, ts, us, vs, dots : arrays[N]
-        Results; see :class:`sim.golden.tracer.Hits`.
+    ids : int32[2, N]
+        Receives instance_id and prim_id, −1 on a miss.
+    distances : float64[3, N]
+        Receives t, u, v; inf, 0, 0 on a miss.
     """
-    top_lower, top_upper, top_first, top_count, top_items = top
     for ray in numba.prange(len(origins)):
-        origin, direction = origins[ray], directions[ray]
-        inverse = 1.0 / direction
-        excluded = (excluded_instance[ray], excluded_prim[ray])
-        best = (np.inf, 0.0, 0.0, np.int64(-1), np.int64(-1))
-        top_stack, stack = np.empty(_STACK_DEPTH, np.int32), np.empty(_STACK_DEPTH, np.int32)
-        object_origin, object_direction = np.empty(3), np.empty(3)
-        top_stack[0] = 0
-        num_waiting = 1 if len(top_first) else 0
-        while num_waiting:
-            num_waiting -= 1
-            node = top_stack[num_waiting]
-            if _enters(top_lower[node], top_upper[node], origin, inverse, best[0]) == np.inf:
-                continue
-            if not top_count[node]:
-                child = top_first[node]
-                t0 = _enters(top_lower[child], top_upper[child], origin, inverse, best[0])
-                t1 = _enters(top_lower[child + 1], top_upper[child + 1], origin, inverse, best[0])
-                nearer = 0 if t0 <= t1 else 1
-                top_stack[num_waiting] = child + 1 - nearer
-                top_stack[num_waiting + 1] = child + nearer
-                num_waiting += 2
-                continue
-            for i in range(top_first[node], top_first[node] + top_count[node]):
-                instance = top_items[i]
-                m = inverses[instance]
-                for k in range(3):
-                    object_origin[k] = m[k, 0] * origin[0] + m[k, 1] * origin[1] + m[k, 2] * origin[2] + m[k, 3]
-                    object_direction[k] = m[k, 0] * direction[0] + m[k, 1] * direction[1] + m[k, 2] * direction[2]
-                node_base, item_base, triangle_base = bases[mesh_of[instance]]
-                best = _trace_mesh(object_origin, object_direction, t_min, best, nodes, corners, node_base, item_base,
-                                   triangle_base, np.int64(instance), excluded, stack)
-        instance_ids[ray], prim_ids[ray] = best[3], best[4]
-        ts[ray], us[ray], vs[ray] = best[0], best[1], best[2]
-        dots[ray] = 0.0
-        if best[3] >= 0:
-            normal = _unit_normal(corners[bases[mesh_of[best[3]], 2] + best[4]])
-            m = inverses[best[3]]
-            for k in range(3):
-                dots[ray] += normal[k] * (m[k, 0] * direction[0] + m[k, 1] * direction[1] + m[k, 2] * direction[2])
+        hit = _trace_ray(origins[ray], directions[ray], t_min, (excluded[0, ray], excluded[1, ray]), top, inverses,
+                         bases, nodes, corners)
+        distances[0, ray], distances[1, ray], distances[2, ray] = hit[0], hit[1], hit[2]
+        ids[0, ray], ids[1, ray] = hit[3], hit[4]

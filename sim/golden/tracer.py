@@ -68,6 +68,15 @@ def _world_boxes(scene):
     return lower, upper
 
 
+def _unit_normals(corners):
+    """Unit normals along (v1−v0)×(v2−v0) of triangles float64[N, 3, 3]."""
+    edges = corners[:, 1:] - corners[:, :1]
+    # Scaled first, so that products of tiny or huge edges stay within the format.
+    edges /= np.abs(edges).max(axis=(1, 2), keepdims=True)
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
 def trace(scene, origins, directions, t_min=0.0, *, exclude=None):
     """Closest hit of each ray at t > ``t_min``; ties go to the lowest (instance_id, prim_id).
 
@@ -81,7 +90,7 @@ def trace(scene, origins, directions, t_min=0.0, *, exclude=None):
         Rays, broadcast against each other; directions of any length.
     t_min : float
     exclude : pair of int arrays, optional
-        instance_id and prim_id of a triangle that each ray ignores, −1 for none.
+        instance_id and prim_id of a triangle that each ray ignores, −1 for none; of the rays' shape.
 
     Returns
     -------
@@ -92,24 +101,26 @@ def trace(scene, origins, directions, t_min=0.0, *, exclude=None):
     origins, directions = (np.ascontiguousarray(rays.reshape(-1, 3)) for rays in (origins, directions))
     n = len(origins)
     if exclude is None:
-        exclude = np.full((2, n), -1, np.int32)
-    exclude = [np.ascontiguousarray(ids, np.int32).reshape(n) for ids in exclude]
+        exclude = (-1, -1)
+    excluded = np.ascontiguousarray(np.stack([np.broadcast_to(i, shape).reshape(n) for i in exclude]), np.int32)
 
     corners, bvhs = zip(*map(_mesh_bvh, scene.meshes), strict=True)
     sizes = [(len(bvh.first), len(bvh.items), len(c)) for bvh, c in zip(bvhs, corners, strict=True)]
-    bases = np.cumsum([(0, 0, 0), *sizes], axis=0)[:-1]
+    mesh_of = np.array([instance.mesh for instance in scene.instances])
+    bases = np.cumsum([(0, 0, 0), *sizes], axis=0)[mesh_of]
+    corners, nodes = np.concatenate(corners), Bvh(*map(np.concatenate, zip(*bvhs, strict=True)))
     lower, upper = _world_boxes(scene)
     top = build_bvh(lower, upper, (lower <= upper).all(axis=1))
-    full = np.tile(np.eye(4), (len(scene.instances), 1, 1))
-    full[:, :3] = [instance.transform for instance in scene.instances]
-    inverses = np.ascontiguousarray(np.linalg.inv(full)[:, :3])
-    mesh_of = np.array([instance.mesh for instance in scene.instances], np.int32)
+    maps = np.tile(np.eye(4), (len(scene.instances), 1, 1))
+    maps[:, :3] = [instance.transform for instance in scene.instances]
+    inverses = np.ascontiguousarray(np.linalg.inv(maps)[:, :3])
 
-    ids = np.empty((2, n), np.int32)
-    t, u, v, dot = np.empty((4, n))
-    trace_rays(origins, directions, float(t_min), *exclude, top, inverses, mesh_of, bases,
-               Bvh(*map(np.concatenate, zip(*bvhs, strict=True))), np.concatenate(corners), ids[0], ids[1], t, u, v, dot)
-    return Hits(ids[0], ids[1], t, u, v, dot).reshape(*shape)
+    ids, distances = np.empty((2, n), np.int32), np.empty((3, n))
+    trace_rays(origins, directions, float(t_min), excluded, top, inverses, bases, nodes, corners, ids, distances)
+    dot, hit = np.zeros(n), ids[1] >= 0
+    normals = _unit_normals(corners[bases[ids[0, hit], 2] + ids[1, hit]])
+    dot[hit] = np.einsum("ni,nij,nj->n", normals, inverses[ids[0, hit], :, :3], directions[hit])
+    return Hits(*ids, *distances, dot).reshape(*shape)
 
 
 def render(scene, camera, width, height):

@@ -3,5 +3,6 @@
 from .bench import HangError, SimulationError
 from .build import BuildError
 from .machine import render_rtl
+from .pysim import render_pysim
 
-__all__ = ["BuildError", "HangError", "SimulationError", "render_rtl"]
+__all__ = ["BuildError", "HangError", "SimulationError", "render_pysim", "render_rtl"]

@@ -13,7 +13,7 @@ from ..model.model import camera_rows
 from ..scene.triangles import pack_fields
 from .bench import Bench
 
-__all__ = ["camera_words", "decode_pixels", "render_rtl"]
+__all__ = ["camera_words", "decode_pixels", "render_rtl", "report_of"]
 
 _UNITS = ("traversal", "list", "transformation", "intersection")
 
@@ -54,6 +54,16 @@ def decode_pixels(pixels, image, config):
     for channel, shift in enumerate((16, 8, 0)):
         frame.color[..., channel] = color >> shift & 255
     return frame
+
+
+def report_of(counters, bytes_read, num_rays, rate):
+    """What a simulated chip has to say of a picture."""
+    cycles = counters["cycles"]
+    return dict(
+        cycles=cycles, rays=num_rays, cycles_per_ray=cycles / num_rays, packets=counters["packets"],
+        busy={unit: counters[f"busy_{unit}"] / cycles for unit in _UNITS},
+        cache={name: {"hits": counters[f"hit_{name}"], "misses": counters[f"miss_{name}"]} for name in CACHES},
+        bytes=bytes_read, simulated_hz=rate)
 
 
 def wave_window(begun, written, pixels, width, height):
@@ -116,11 +126,5 @@ def render_rtl(image, camera, width, height, *, config, background=(0, 0, 0), la
         cycles = wave_window(begun, written, pixels, width, height)
     raw, _, _, counters, bytes_read, rate = draw(trace, wave, cycles)
     frame = decode_pixels(raw, image, config)
-    total = counters["cycles"]
-    frame.report.update(
-        cycles=total, rays=width * height, cycles_per_ray=total / (width * height),
-        packets=counters["packets"],
-        busy={unit: counters[f"busy_{unit}"] / total for unit in _UNITS},
-        cache={name: {"hits": counters[f"hit_{name}"], "misses": counters[f"miss_{name}"]} for name in CACHES},
-        bytes=bytes_read, simulated_hz=rate)
+    frame.report.update(report_of(counters, bytes_read, width * height, rate))
     return frame

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-__all__ = ["usable_triangles", "unusable_warnings"]
+__all__ = ["unusable_warnings", "usable_triangles"]
 
 
 def usable_triangles(mesh):

@@ -3,25 +3,28 @@
 import numba
 import numpy as np
 
-__all__ = ["clipped_bounds"]
+__all__ = ["MAX_CORNERS", "clip_bounds"]
+
+# Exact arithmetic makes nine at most; rounded, each of the six planes can cross every edge and so double
+# them.
+MAX_CORNERS = 3 * 2 ** 6
 
 
 @numba.njit(cache=True)
-def clipped_bounds(triangle, box_lower, box_upper, pad, polygon, clipped, lower, upper):
-    """Bounds of {x in the box: x within ``pad`` of the triangle in every coordinate}; False if that is empty.
+def clip_bounds(triangle, box, pad, bounds, polygon, clipped):
+    """Narrow ``bounds`` to the points of the box within ``pad`` of the triangle in each coordinate; false if
+    none is.
 
-    Those points lie within ``pad`` of the triangle clipped to the box widened by ``pad`` (Sutherland, Hodgman
-    1974).
+    Those lie within ``pad`` of the triangle clipped to the box widened by ``pad`` (Sutherland, Hodgman 1974).
 
     Parameters
     ----------
     triangle : float64[3, 3]
-    box_lower, box_upper : float64[3]
+    box, bounds : float64[6]
+        Lower, then upper x, y, z.
     pad : float
-    polygon, clipped : float64[9, 3]
+    polygon, clipped : float64[MAX_CORNERS, 3]
         Work space.
-    lower, upper : float64[3]
-        On entry, bounds already known; on return, narrowed to the result.
     """
     num_corners = 3
     for i in range(3):
@@ -30,9 +33,9 @@ def clipped_bounds(triangle, box_lower, box_upper, pad, polygon, clipped, lower,
     for side in range(6):
         k = side >> 1
         if side & 1:
-            plane, sign = box_upper[k] + pad, -1.0
+            plane, sign = box[3 + k] + pad, -1.0
         else:
-            plane, sign = box_lower[k] - pad, 1.0
+            plane, sign = box[k] - pad, 1.0
         num_clipped = 0
         previous = num_corners - 1
         previous_depth = (polygon[previous, k] - plane) * sign
@@ -61,8 +64,8 @@ def clipped_bounds(triangle, box_lower, box_upper, pad, polygon, clipped, lower,
         # Corners made by clipping carry up to a few ulp of error per plane; original ones bound them from
         # outside.
         slack = 16 * 2.0 ** -53 * max(abs(least), abs(most))
-        lower[k] = max(lower[k], least - pad - slack)
-        upper[k] = min(upper[k], most + pad + slack)
-        if lower[k] > upper[k]:
+        bounds[k] = max(bounds[k], least - pad - slack)
+        bounds[3 + k] = min(bounds[3 + k], most + pad + slack)
+        if bounds[k] > bounds[3 + k]:
             return False
     return True

@@ -38,7 +38,7 @@ class Element:
         value = self.data.get(key, default)
         if value is _REQUIRED:
             raise self.error(f"'{key}' is missing")
-        if value is not default and (not isinstance(value, kinds) or isinstance(value, bool) and bool not in kinds):
+        if value is not default and (not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds)):
             raise self.error(f"'{key}' must be {what}, not {value!r}")
         return value
 

@@ -7,7 +7,8 @@ import numba
 __all__ = ["LEAF", "MAX_PLANES", "best_split", "round_down", "round_up"]
 
 LEAF = 3
-# Nodes with more primitives take their candidate planes from a grid, smaller ones from the primitives' bounds.
+# Nodes with more primitives take their candidate planes from a grid, smaller ones from the primitives'
+# bounds.
 _MAX_EXACT = 512
 _NUM_GRID = 256
 MAX_PLANES = 2 * _MAX_EXACT
@@ -32,20 +33,21 @@ def round_up(x, frac_width, min_normal):
 
 
 @numba.njit(cache=True)
-def _candidates(planes, lower, upper, frac_width, min_normal):
+def _candidates(planes, bounds, start, end, axis, frac_width, min_normal):
     """Fill ``planes`` in ascending order; returns their number."""
-    n = len(lower)
+    n = end - start
     if n <= _MAX_EXACT:
         for i in range(n):
-            planes[i] = round_down(lower[i], frac_width, min_normal)
-            planes[n + i] = round_up(upper[i], frac_width, min_normal)
+            planes[i] = round_down(bounds[start + i, axis], frac_width, min_normal)
+            planes[n + i] = round_up(bounds[start + i, 3 + axis], frac_width, min_normal)
         planes[:2 * n].sort()
         return 2 * n
-    first, last = lower.min(), upper.max()
-    for j in range(1, _NUM_GRID):
-        planes[j] = round_down(first + (last - first) * j / _NUM_GRID, frac_width, min_normal)
-    planes[0] = round_down(first, frac_width, min_normal)
-    planes[_NUM_GRID] = round_up(last, frac_width, min_normal)
+    least, most = bounds[start, axis], bounds[start, 3 + axis]
+    for i in range(start, end):
+        least, most = min(least, bounds[i, axis]), max(most, bounds[i, 3 + axis])
+    for j in range(_NUM_GRID):
+        planes[j] = round_down(least + (most - least) * j / _NUM_GRID, frac_width, min_normal)
+    planes[_NUM_GRID] = round_up(most, frac_width, min_normal)
     return _NUM_GRID + 1
 
 
@@ -63,17 +65,18 @@ def _first(planes, num_planes, x, above):
 
 
 @numba.njit(cache=True)
-def best_split(lower, upper, box_lower, box_upper, costs, planes, events):
+def best_split(bounds, start, end, box, costs, planes, events):
     """Cheapest split of a node: (cost, axis, position, flat primitives go up); axis 3 if a leaf is cheaper.
 
-    cost = traversal + intersection · (A_lower · n_lower + A_upper · n_upper) / A with A the boxes' areas, the second
-    term less its ``empty_bonus`` part if a side is empty; a leaf's is intersection · n.
+    cost = traversal + intersection · (A_lower · n_lower + A_upper · n_upper) / A with A the boxes' areas, the
+    second term less its ``empty_bonus`` part if a side is empty; a leaf's is intersection · n.
 
     Parameters
     ----------
-    lower, upper : float64[3, n]
-        Bounds of the primitives in the node.
-    box_lower, box_upper : float64[3]
+    bounds : float64[:, 6]
+        Bounds of primitives, lower then upper x, y, z; those from ``start`` to ``end`` are in the node.
+    start, end : int
+    box : float64[6]
         The node's box.
     costs : tuple
         traversal_cost, intersection_cost, empty_bonus, frac_width, min_normal.
@@ -83,34 +86,35 @@ def best_split(lower, upper, box_lower, box_upper, costs, planes, events):
         Work space.
     """
     traversal_cost, intersection_cost, empty_bonus, frac_width, min_normal = costs
-    n = lower.shape[1]
+    n = end - start
     best = (intersection_cost * n, LEAF, 0.0, False)
-    extent = box_upper - box_lower
-    area = extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0]
+    width, depth, height = box[3] - box[0], box[4] - box[1], box[5] - box[2]
+    area = width * depth + depth * height + height * width
     if not area > 0.0:
         return best
     for axis in range(3):
-        num_planes = _candidates(planes, lower[axis], upper[axis], frac_width, min_normal)
+        num_planes = _candidates(planes, bounds, start, end, axis, frac_width, min_normal)
         # By first plane: primitives that reach below it, that no longer reach above it, that lie in it.
-        events[:, :num_planes + 1] = 0
-        for i in range(n):
-            low, high = lower[axis, i], upper[axis, i]
-            start, end = _first(planes, num_planes, low, True), _first(planes, num_planes, high, False)
-            events[0, start] += 1
-            events[1, end] += 1
-            if start > end:
-                events[2, end] += 1
-        face = extent[(axis + 1) % 3] * extent[(axis + 2) % 3]
-        girth = extent[(axis + 1) % 3] + extent[(axis + 2) % 3]
+        for j in range(num_planes + 1):
+            events[0, j], events[1, j], events[2, j] = 0, 0, 0
+        for i in range(start, end):
+            low, high = bounds[i, axis], bounds[i, 3 + axis]
+            first, last = _first(planes, num_planes, low, True), _first(planes, num_planes, high, False)
+            events[0, first] += 1
+            events[1, last] += 1
+            if first > last:
+                events[2, last] += 1
+        lowest, highest = box[axis], box[3 + axis]
+        face = (depth * height, height * width, width * depth)[axis]
+        girth = (depth + height, height + width, width + depth)[axis]
         num_lower, num_upper = 0, n
         for j in range(num_planes):
             num_lower += events[0, j]
             num_upper -= events[1, j]
             position = planes[j]
-            if j > 0 and position == planes[j - 1] or not box_lower[axis] < position < box_upper[axis]:
+            if (j > 0 and position == planes[j - 1]) or not lowest < position < highest:
                 continue
-            area_lower = face + (position - box_lower[axis]) * girth
-            area_upper = face + (box_upper[axis] - position) * girth
+            area_lower, area_upper = face + (position - lowest) * girth, face + (highest - position) * girth
             for flat_up in range(2 if events[2, j] else 1):
                 n_lower = num_lower + (0 if flat_up else events[2, j])
                 n_upper = num_upper + (events[2, j] if flat_up else 0)

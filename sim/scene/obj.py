@@ -24,40 +24,46 @@ _MAX_KEY = 8
 
 @dataclass
 class _Lines:
-    """The file's lines, sorted by keyword; row numbers count from 0, continuation lines are joined."""
+    """The words of each line; rows count from 0, and a continued line is on its first row."""
 
     path: Path
-    lines: list[bytes]
+    words: list[list[bytes]]
     keys: np.ndarray
 
     def rows(self, key):
         return np.flatnonzero(self.keys == key)
 
+    def words_of(self, rows):
+        return [self.words[row] for row in rows.tolist()]
+
     def error(self, row, text):
         return SceneError(f"{self.path}:{row + 1}: {text}")
 
     def names(self, key):
-        """Rows of a keyword, and the argument of each."""
+        """Rows of a keyword, and the rest of each line."""
         rows = self.rows(key)
-        arguments = (self.lines[row].split(None, 1)[1:] for row in rows)
-        return rows, [b"".join(argument).decode("utf-8", "replace").strip() for argument in arguments]
+        return rows, [b" ".join(words[1:]).decode("utf-8", "replace") for words in self.words_of(rows)]
 
 
 def _read_lines(path):
-    lines = [line.split(b"#", 1)[0].strip() if b"#" in line else line.strip()
-             for line in path.read_bytes().splitlines()]
-    for row in range(len(lines) - 2, -1, -1):
-        if lines[row].endswith(b"\\"):
-            lines[row] = lines[row][:-1] + b" " + lines[row + 1]
-            lines[row + 1] = b""
-    keys = np.array([line.split(None, 1)[0][:_MAX_KEY] if line else b"" for line in lines], dtype=f"S{_MAX_KEY}")
-    return _Lines(path, lines, keys)
+    data = path.read_bytes()
+    lines = data.splitlines()
+    if b"#" in data:
+        lines = [line.split(b"#", 1)[0] for line in lines]
+    if b"\\" in data:
+        for row in range(len(lines) - 2, -1, -1):
+            if lines[row].rstrip().endswith(b"\\"):
+                lines[row] = lines[row].rstrip()[:-1] + b" " + lines[row + 1]
+                lines[row + 1] = b""
+    words = [line.split() for line in lines]
+    # Cut to a length that tells keywords apart: one long word must not widen the whole array.
+    return _Lines(path, words, np.array([line[0][:_MAX_KEY] if line else b"" for line in words]))
 
 
 def _vectors(text, key, width):
     """All lines of one keyword as float64[n, width]; numbers beyond ``width`` (w, colours) are ignored."""
     rows = text.rows(key)
-    words = [text.lines[row].split() for row in rows]
+    words = text.words_of(rows)
     try:
         return np.array([line[1:1 + width] for line in words], dtype=np.float64).reshape(-1, width)
     except ValueError:
@@ -75,11 +81,7 @@ def _vectors(text, key, width):
 def _corners(text, rows, words):
     """Vertex, texture and normal number of every corner as int64[n, 3], 0 where not given."""
     flat = list(chain.from_iterable(line[1:] for line in words))
-    for row, line in zip(rows, words, strict=True):
-        if len(line) < 4:
-            raise text.error(row, f"face with {len(line) - 1} corners; at least 3 are needed")
-    joined = b" ".join(flat)
-    if b"/" not in joined:
+    if b"/" not in b" ".join(flat):
         try:
             return np.pad(np.array(flat, dtype=np.int64)[:, None], ((0, 0), (0, 2)))
         except (ValueError, OverflowError):
@@ -146,8 +148,11 @@ def load_obj(path):
     face_rows = text.rows(b"f")
     if not face_rows.size:
         raise SceneError(f"{path}: scene is empty: no faces ('f' lines)")
-    words = [text.lines[row].split() for row in face_rows]
+    words = text.words_of(face_rows)
     num_corners = np.fromiter(map(len, words), dtype=np.int64) - 1
+    short = np.flatnonzero(num_corners < 3)
+    if short.size:
+        raise text.error(face_rows[short[0]], f"face with {num_corners[short[0]]} corners; at least 3 are needed")
     corners = _corners(text, face_rows, words)
     corner_rows = np.repeat(face_rows, num_corners)
     index = np.stack([_resolve(text, corners, corner_rows, column, key, len(values)) for column, (key, values)

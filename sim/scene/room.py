@@ -117,11 +117,11 @@ def _chair(parts, center, heading_deg):
         return points @ turn.T + (*center, 0.0)
 
     parts.box((-0.22, -0.22, 0.43), (0.22, 0.22, 0.47), "blue lacquer", place=place)
-    for x in (-0.2, 0.2):
+    for x in (-0.19, 0.19):
         parts.box((x - 0.02, 0.17, _GAP), (x + 0.02, 0.21, 0.45), "blue lacquer", place=place)
         parts.box((x - 0.02, -0.21, _GAP), (x + 0.02, -0.17, 0.92), "blue lacquer", place=place)
     for z in (0.62, 0.8):
-        parts.box((-0.19, -0.205, z), (0.19, -0.175, z + 0.1), "blue lacquer", place=place)
+        parts.box((-0.18, -0.205, z), (0.18, -0.175, z + 0.1), "blue lacquer", place=place)
 
 
 def _things(parts):

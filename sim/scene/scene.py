@@ -10,7 +10,7 @@ from .camera import Camera
 from .check import usable_triangles
 from .error import SceneError
 
-__all__ = ["Camera", "DEFAULT_MATERIAL", "IDENTITY", "Instance", "Material", "Mesh", "Scene", "SceneError"]
+__all__ = ["DEFAULT_MATERIAL", "IDENTITY", "Camera", "Instance", "Material", "Mesh", "Scene", "SceneError"]
 
 IDENTITY = np.eye(3, 4)
 

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from amaranth.back import rtlil
 
 from fpu import Adder, Comparator, Divider, FloatFormat, Multiplier, Rounding, Subtractor
+from fpu.product import Product
 from tests.fpu import reference
 from tests.fpu.verilated import Bank
 
@@ -13,7 +15,7 @@ NUMPY = {FloatFormat(5, 10): np.float16, FloatFormat(8, 23): np.float32}
 EXACT = {Adder: reference.add, Subtractor: reference.subtract, Multiplier: reference.multiply,
          Divider: reference.divide}
 # One more than the steps there are to put registers behind
-MAX_LATENCY = {Adder: 15, Multiplier: 4, Divider: 13, Comparator: 3}
+MAX_LATENCY = {Adder: 17, Multiplier: 5, Divider: 13, Comparator: 4}
 
 
 @pytest.fixture(scope="session")
@@ -130,6 +132,26 @@ def test_emulation(cls, rounding, fmt, pairs):
     got = [emulate(fmt.params, *pair) for pair in zip(fmt.decode(a).tolist(), fmt.decode(b).tolist(), strict=True)]
     assert (fmt.encode(np.array(got)) == expected(cls, rounding, a, b, fmt)).all()
     assert (fmt.quantize(got) == got).all()
+
+
+class ECP5:
+    device = "LFE5U-85F"
+
+
+@pytest.mark.parametrize("latency", range(1, 6))
+def test_block_has_the_output_register(latency):
+    """One multiplier block, with one register less outside it."""
+    def flip_flops(platform):
+        text = rtlil.convert(Product(17, cycles=latency), platform=platform)
+        return text.count("cell \\MULT18X18D"), text.count("cell $dff")
+
+    assert flip_flops(None) == (0, latency)
+    assert flip_flops(ECP5()) == (1, latency - 1)
+
+
+def test_block_is_left_to_inference():
+    for product in (Product(17, cycles=0), Product(19, cycles=1)):
+        assert "MULT18X18D" not in rtlil.convert(product, platform=ECP5())
 
 
 def test_negative_latency():

@@ -50,19 +50,21 @@ def embree(scene, origins, directions):
     return np.where(hit, result["geomID"], -1), result["primID"], np.where(hit, result["tfar"], np.inf)
 
 
-def assert_agree(scene, origins, directions, *, allowed):
-    """Golden and Embree (float32) show the same, but for a few rays near edges, where they are as far apart as float32.
+def assert_agree(scene, origins, directions):
+    """Golden and Embree (float32) see the same, but where golden's two nearest surfaces are one for a
+    float32.
 
-    ``allowed``: fraction of rays that may differ in triangle, and a hundredth of it in distance.
+    A ray in ten thousand may differ otherwise: those that pass an outline by less than float32 resolves.
     """
     hits = trace(scene, origins, directions)
+    assert hits.is_hit.mean() > 0.2
     instance_id, prim_id, t = embree(scene, origins, directions)
     differ = (hits.instance_id != instance_id) | (hits.prim_id != prim_id)
-    assert differ.mean() <= allowed
+    second = trace(scene, origins, directions, exclude=(hits.instance_id, hits.prim_id))
     with np.errstate(invalid="ignore"):
+        clear = differ & ~(np.abs(second.t - hits.t) <= 1e-5 * hits.t)
         far = (hits.t != t) & ~(np.abs(hits.t - t) <= 1e-4 * hits.t)
-    assert far.mean() <= allowed / 5
-    assert hits.is_hit.any()
+    assert clear.mean() <= 1e-4 and far.mean() <= 1e-4
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -71,13 +73,13 @@ def test_instances_agree_with_embree_on_random_rays(seed):
     rng = np.random.default_rng(seed + 100)
     origins = rng.uniform(-6, 6, (20000, 3))
     targets = rng.uniform(-3, 3, (20000, 3))
-    assert_agree(scene, origins, targets - origins, allowed=5e-4)
+    assert_agree(scene, origins, targets - origins)
 
 
 def test_room_agrees_with_embree():
     scene = load_scene("room")
     origin, directions = scene.default_camera().rays(256, 192)
-    assert_agree(scene, origin, directions.reshape(-1, 3), allowed=5e-4)
+    assert_agree(scene, origin, directions.reshape(-1, 3))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -85,8 +87,7 @@ def test_scene_agrees_with_embree(name, scene_file):
     scene = load_scene(scene_file(SCENES[name]))
     for view in json.loads(scene_file("cameras.json").read_text())[name]:
         origin, directions = Camera(**view).rays(256, 192)
-        # Coincident and nearly coincident surfaces in these scenes: float32 picks one of them by chance.
-        assert_agree(scene, origin, directions.reshape(-1, 3), allowed=0.02)
+        assert_agree(scene, origin, directions.reshape(-1, 3))
 
 
 def test_hit_point_is_as_defined():

@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
+from sim.golden import trace
 from sim.scene import Camera, Instance, Material, Mesh, Scene, SceneError, load_scene
 from sim.scene.check import usable_triangles
 from sim.scene.room import room_scene
@@ -143,9 +144,20 @@ def test_furniture_of_the_room_is_closed():
 
 def test_shell_of_the_room_is_closed():
     """Every ray from the middle hits something: nothing is seen through walls, window or corners."""
-    from sim.golden import trace
     rng = np.random.default_rng(1)
     assert trace(room_scene(), (2.0, 1.0, 1.6), rng.normal(size=(100_000, 3))).is_hit.all()
+
+
+def test_no_two_surfaces_of_the_room_coincide():
+    """Where the two nearest surfaces are at one distance, they are triangles that meet in an edge."""
+    scene = room_scene()
+    origin, directions = scene.default_camera().rays(512, 384)
+    first = trace(scene, origin, directions)
+    second = trace(scene, origin, directions, exclude=(first.instance_id, first.prim_id))
+    same = np.abs(second.t - first.t) <= 1e-9 * first.t
+    corners = scene.meshes[0].triangles[np.stack([first.prim_id[same], second.prim_id[same]])]
+    shared = (corners[0][:, :, None] == corners[1][:, None, :]).sum(axis=(1, 2))
+    assert (shared >= 2).all()
 
 
 @pytest.mark.parametrize("name", ["scene.fbx", "scene", "room2"])

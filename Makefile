@@ -1,0 +1,37 @@
+# Every target works from a fresh clone: it makes the virtual environment first.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+SCENES ?= ../shared/scenes
+
+.PHONY: help setup render test lint first-light clean
+
+help:
+	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
+	@echo "make test         every test"
+	@echo "make lint         ruff"
+	@echo "make first-light  the figures of docs/first-light.md, from the scenes in SCENES=$(SCENES)"
+
+setup: $(VENV)/.ready
+
+# Where there is no C++ compiler, a wheel brings one.
+$(VENV)/.ready: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable ".[test$(shell command -v g++ clang++ >/dev/null || echo ,zig)]"
+	@touch $@
+
+render: setup
+	@mkdir -p build/render
+	$(BIN)/dynrt render room --output build/render/room.png --report build/render/room.json
+
+test: setup
+	$(BIN)/pytest --numprocesses auto --dist worksteal
+
+lint: setup
+	$(BIN)/ruff check
+
+first-light: setup
+	$(BIN)/dynrt first-light --scenes $(SCENES)
+
+clean:
+	rm -rf build .pytest_cache .ruff_cache

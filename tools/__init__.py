@@ -1,0 +1,1 @@
+"""The ``dynrt`` command line."""

@@ -1,0 +1,18 @@
+"""``dynrt``, the command."""
+
+import click
+
+from .inspect import image
+from .render import render
+
+__all__ = ["main"]
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "show_default": False})
+@click.version_option(package_name="dynrt")
+def main():
+    """DynRT: a real-time ray tracer in hardware, simulated."""
+
+
+main.add_command(render)
+main.add_command(image)

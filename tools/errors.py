@@ -1,0 +1,56 @@
+"""How commands end when something is wrong, and how they write files whole or not at all."""
+
+import os
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from sim.machine import BuildError, SimulationError
+from sim.scene import SceneError
+
+__all__ = ["BadInput", "Failure", "clear_errors", "written_whole"]
+
+
+class BadInput(click.ClickException):
+    """Something given by the user cannot be used."""
+
+    exit_code = 2
+
+
+class Failure(click.ClickException):
+    """The input was good, and still it did not work."""
+
+    exit_code = 1
+
+
+@contextmanager
+def clear_errors():
+    """Turns the errors of the packages into messages and exit codes."""
+    try:
+        yield
+    except (SceneError, OverflowError) as error:
+        raise BadInput(str(error)) from error
+    except (BuildError, SimulationError) as error:
+        raise Failure(str(error)) from error
+
+
+@contextmanager
+def written_whole(path):
+    """A path to write to, which becomes ``path`` only if all goes well."""
+    path = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written: {error.strerror}") from error
+    os.close(handle)
+    try:
+        yield Path(name)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

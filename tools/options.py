@@ -1,0 +1,75 @@
+"""Options as people type them."""
+
+import re
+from dataclasses import fields, replace
+
+import click
+
+from fpu import FloatFormat
+from rtl.config import ChipConfig
+from sim.scene import Camera, SceneError
+
+__all__ = ["CAMERA", "CHIP", "CYCLES", "FORMAT", "PIXEL", "SIZE", "chip_config"]
+
+
+class _Parsed(click.ParamType):
+    def __init__(self, name, parse):
+        self.name = name
+        self._parse = parse
+
+    def convert(self, value, param, ctx):
+        if not isinstance(value, str):
+            return value
+        try:
+            return self._parse(value)
+        except (ValueError, SceneError) as error:
+            self.fail(str(error), param, ctx)
+
+
+def _size(text):
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    if not match or not all(1 <= int(number) <= 4095 for number in match.groups()):
+        raise ValueError(f"'{text}' is not WIDTHxHEIGHT with both from 1 to 4095, like 512x384")
+    return tuple(map(int, match.groups()))
+
+
+def _pixel(text):
+    match = re.fullmatch(r"(\d+),(\d+)", text)
+    if not match:
+        raise ValueError(f"'{text}' is not X,Y like 256,192")
+    return tuple(map(int, match.groups()))
+
+
+def _cycles(text):
+    match = re.fullmatch(r"(\d+):(\d+)", text)
+    if not match or int(match[1]) >= int(match[2]):
+        raise ValueError(f"'{text}' is not FIRST:LAST with FIRST before LAST, like 1000:2000")
+    return tuple(map(int, match.groups()))
+
+
+_PARAMETERS = {field.name for field in fields(ChipConfig)} - {"fmt"}
+
+
+def _chip(text):
+    name, _, value = text.partition("=")
+    if name not in _PARAMETERS:
+        raise ValueError(f"'{name}' is not a parameter of the chip; there are {', '.join(sorted(_PARAMETERS))}")
+    if not re.fullmatch(r"-?\d+", value):
+        raise ValueError(f"'{text}' is not NAME=NUMBER like num_threads=32")
+    return name, int(value)
+
+
+SIZE = _Parsed("WIDTHxHEIGHT", _size)
+PIXEL = _Parsed("X,Y", _pixel)
+CYCLES = _Parsed("FIRST:LAST", _cycles)
+CAMERA = _Parsed("NUMBERS", Camera.parse)
+FORMAT = _Parsed("E.F", FloatFormat.parse)
+CHIP = _Parsed("NAME=NUMBER", _chip)
+
+
+def chip_config(fmt, parameters):
+    """The chip with this format and these parameters, a list of (name, value)."""
+    try:
+        return replace(ChipConfig(), fmt=fmt, **dict(parameters))
+    except ValueError as error:
+        raise click.UsageError(f"--chip: {error}") from error

@@ -1,0 +1,210 @@
+"""``dynrt render``: one picture or an animation, by whichever engine."""
+
+import contextlib
+import json
+import sys
+import time
+from pathlib import Path
+
+import click
+import numpy as np
+from PIL import Image
+from rich.console import Console
+
+from fpu import FloatFormat
+from sim.golden import psnr, render_golden
+from sim.machine import render_pysim, render_rtl
+from sim.model import render_model
+from sim.scene import load_scene
+from sim.scene.compile import CompiledScene
+
+from .errors import BadInput, clear_errors, written_whole
+from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, chip_config
+
+__all__ = ["render"]
+
+# Pixels up to which the model and golden pictures are drawn without being asked for, to compare with.
+_CHECKED_PIXELS = 1 << 21
+
+
+@click.command()
+@click.argument("scene")
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="PNG to write  [default: "
+              "the scene's name + .png]")
+@click.option("--engine", type=click.Choice(["golden", "model", "rtl", "pysim"]), default="rtl", show_default=True,
+              help="golden: float64 ray tracer; model: the chip without a clock; rtl: the Verilated chip; pysim: the "
+              "chip in Amaranth's simulator")
+@click.option("--size", type=SIZE, default="512x384", show_default=True)
+@click.option("--format", "fmt", type=FORMAT, default=str(FloatFormat(7, 16)), show_default=True,
+              help="The chip's floats: exponent and fraction bits")
+@click.option("--camera", type=CAMERA, help="eye x,y,z, look-at x,y,z, up x,y,z, horizontal field of view in degrees")
+@click.option("--view", type=click.IntRange(min=0), help="Number of a camera in the scene's file  [default: the first]")
+@click.option("--frames", type=click.IntRange(min=1), help="Draw so many pictures of an animated scene, as "
+              "NAME-0000.png and so on")
+@click.option("--background", type=click.IntRange(0, 255), nargs=3, default=(0, 0, 0), show_default=True,
+              metavar="R G B")
+@click.option("--flatten/--instances", default=None, help="Put all triangles into one space, or transform rays into "
+              "each instance  [default: flatten if nothing moves and no mesh is there twice]")
+@click.option("--chip", "parameters", type=CHIP, multiple=True, help="A parameter of the chip, see rtl/config.py")
+@click.option("--latency", type=click.IntRange(1, 1000), default=4, show_default=True,
+              help="Cycles from a memory request to its first word")
+@click.option("--jitter", type=click.IntRange(0, 1000), default=0, show_default=True,
+              help="Up to so many cycles more, at random")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of that randomness")
+@click.option("--wave", type=click.Path(dir_okay=False, path_type=Path), help="Waveform to write, .vcd or .fst")
+@click.option("--wave-cycles", type=CYCLES, help="Only these cycles  [default: all]")
+@click.option("--wave-pixel", "wave_pixels", type=PIXEL, multiple=True, help="Only while this pixel is at work")
+@click.option("--hits", type=click.Path(dir_okay=False, path_type=Path), help="NPZ to write, with instance_id, "
+              "prim_id, t, u, v of each pixel")
+@click.option("--report", type=click.Path(dir_okay=False, path_type=Path), help="JSON to write")
+@click.option("--check/--no-check", default=True, help="Compare with the model and with golden")
+def render(scene, output, engine, size, fmt, camera, view, frames, background, flatten, parameters, latency, jitter,
+           seed, wave, wave_cycles, wave_pixels, hits, report, check):
+    """Draw SCENE: an .obj, .ply, .ply.gz, .gltf or .glb file, or 'room', the built-in one."""
+    config = chip_config(fmt, parameters)
+    _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames, hits)
+    output = output or Path(f"{Path(scene).name.split('.')[0]}.png")
+    for path in (output, wave, hits, report):
+        if path is not None and not path.parent.is_dir():
+            raise BadInput(f"{path}: there is no folder {path.parent}")
+    console = Console(stderr=True, highlight=False)
+    with clear_errors(), contextlib.ExitStack() as files:
+        loaded = load_scene(scene)
+        chosen = _camera(loaded, camera, view)
+        if frames and not loaded.is_animated:
+            raise BadInput(f"{scene}: nothing moves in this scene; leave --frames out")
+        compiled = None
+        if engine != "golden" or check:
+            with _progress(console, "building kd-trees"):
+                compiled = CompiledScene(loaded, fmt=fmt, stack_depth=config.stack_depth,
+                                         index_width=config.index_width, flatten=flatten)
+        for warning in [*loaded.warnings, *(compiled.warnings if compiled else [])]:
+            console.print(f"warning: {warning}", markup=False)
+        wave_file = files.enter_context(written_whole(wave)) if wave else None
+
+        times = [0.0] if not frames else [loaded.duration * k / frames for k in range(frames)]
+        drawn = []
+        for number, at in enumerate(times):
+            posed = loaded.at_time(at)
+            view_now = chosen if camera is not None else _camera(posed, None, view)
+            frame = _draw(engine, posed, compiled, view_now, size, config, background, latency, jitter, seed,
+                          wave_file, wave_cycles, wave_pixels, console)
+            _describe(frame, engine, scene, size, config)
+            if check:
+                _compare(frame, engine, posed, compiled, view_now, size, config, background)
+            name = output if not frames else output.with_name(f"{output.stem}-{number:04d}{output.suffix}")
+            drawn.append((name, frame))
+            _print_summary(console, name, frame)
+        # All is drawn; from here on files appear.
+        for name, frame in drawn:
+            with written_whole(name) as path:
+                Image.fromarray(frame.color).save(path, format="PNG")
+        if hits:
+            frame = drawn[0][1]
+            with written_whole(hits) as path:
+                with open(path, "wb") as file:
+                    np.savez_compressed(file, instance_id=frame.instance_id, prim_id=frame.prim_id, t=frame.t,
+                                        u=frame.u, v=frame.v)
+        if report:
+            reports = [frame.report for _, frame in drawn]
+            with written_whole(report) as path:
+                path.write_text(json.dumps(reports if frames else reports[0], indent=1) + "\n")
+
+
+def _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames, hits):
+    width, height = size
+    if max(size) >= 1 << config.coord_width:
+        raise click.UsageError(f"--size: {width}x{height} is too large for a chip with coord_width = "
+                               f"{config.coord_width}, which draws up to {(1 << config.coord_width) - 1} pixels a side")
+    if wave is None and (wave_cycles or wave_pixels):
+        raise click.UsageError("--wave-cycles and --wave-pixel need --wave FILE")
+    if wave is not None:
+        if engine not in ("rtl", "pysim"):
+            raise click.UsageError(f"--wave: the engine {engine} has no clock; use --engine rtl or pysim")
+        kinds = (".vcd", ".fst") if engine == "rtl" else (".vcd",)
+        if wave.suffix.lower() not in kinds:
+            raise click.UsageError(f"--wave: {wave.name} must end in {' or '.join(kinds)} with --engine {engine}")
+        if engine == "pysim" and (wave_cycles or wave_pixels):
+            raise click.UsageError("--wave-cycles and --wave-pixel work with --engine rtl only")
+        if frames and frames > 1:
+            raise click.UsageError("--wave shows one picture; leave --frames out")
+    for x, y in wave_pixels:
+        if x >= width or y >= height:
+            raise click.UsageError(f"--wave-pixel: {x},{y} is outside of the picture of {width}x{height}")
+    if hits is not None and frames and frames > 1:
+        raise click.UsageError("--hits is of one picture; leave --frames out")
+
+
+def _camera(scene, camera, view):
+    if camera is not None:
+        return camera
+    if view is None:
+        return scene.default_camera()
+    if view >= len(scene.cameras):
+        have = f"cameras 0 to {len(scene.cameras) - 1}" if scene.cameras else "no cameras; use --camera"
+        raise BadInput(f"--view: there is no camera {view}, the scene has {have}")
+    return scene.cameras[view]
+
+
+@contextlib.contextmanager
+def _progress(console, what):
+    if not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    with console.status(what) as status:
+        yield lambda text: status.update(text)
+
+
+def _draw(engine, scene, compiled, camera, size, config, background, latency, jitter, seed, wave, wave_cycles,
+          wave_pixels, console):
+    begin = time.perf_counter()
+    with _progress(console, f"drawing by {engine}") as progress:
+        if engine == "golden":
+            frame = render_golden(scene, camera, *size, background=background)
+        else:
+            image = compiled.image(scene)
+            common = dict(config=config, background=background)
+            if engine == "model":
+                frame = render_model(image, camera, *size, **common)
+            elif engine == "rtl":
+                frame = render_rtl(image, camera, *size, **common, latency=latency, jitter=jitter, seed=seed, wave=wave,
+                                   cycles=wave_cycles, pixels=wave_pixels, progress=progress)
+            else:
+                frame = render_pysim(image, camera, *size, **common, latency=latency, wave=wave, progress=progress)
+            frame.report["memory"] = {**image.stats, "bytes": image.num_bytes, "crc32": f"{image.checksum:08x}"}
+    frame.report["seconds"] = time.perf_counter() - begin
+    return frame
+
+
+def _describe(frame, engine, scene, size, config):
+    parameters = {name: value for name, value in vars(config).items() if name != "fmt"}
+    frame.report.update(engine=engine, scene=str(scene), size=list(size), format=str(config.fmt), config=parameters)
+
+
+def _compare(frame, engine, scene, compiled, camera, size, config, background):
+    if size[0] * size[1] > _CHECKED_PIXELS:
+        return
+    if engine in ("rtl", "pysim"):
+        model = render_model(compiled.image(scene), camera, *size, config=config, background=background)
+        frame.report["wrong_pixels_vs_model"] = int(frame.differs(model).sum())
+        frame.report["counts"] = model.report["counts"]
+    if engine != "golden":
+        golden = render_golden(scene, camera, *size, background=background)
+        frame.report["wrong_pixels_vs_golden"] = int(frame.differs_in_surface(golden).sum())
+        frame.report["psnr_vs_golden"] = psnr(frame.color, golden.color)
+
+
+def _print_summary(console, name, frame):
+    report = frame.report
+    pixels = report["size"][0] * report["size"][1]
+    parts = [f"{name}: {report['engine']}, {report['seconds']:.1f} s"]
+    if "cycles" in report:
+        parts.append(f"{report['cycles']:,} cycles, {report['cycles_per_ray']:.2f} a ray, "
+                     f"{report['simulated_hz'] / 1e3:.0f} kHz")
+    if "wrong_pixels_vs_model" in report:
+        parts.append(f"{report['wrong_pixels_vs_model']} pixels differ from the model")
+    if "wrong_pixels_vs_golden" in report:
+        share = 100 * report["wrong_pixels_vs_golden"] / pixels
+        parts.append(f"{report['wrong_pixels_vs_golden']} show another triangle than golden ({share:.3f} %), "
+                     f"PSNR {report['psnr_vs_golden']:.1f} dB")
+    console.print("\n  ".join(parts), markup=False)
