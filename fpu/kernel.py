@@ -108,5 +108,5 @@ def compile_kernel(datapath):
         return _load_kept(kernel_source(datapath, cache=True))
     except OSError:
         functions = {}
-        exec(kernel_source(datapath, cache=False), functions)  # noqa: S102
+        exec(kernel_source(datapath, cache=False), functions)
         return SimpleNamespace(kernel=functions["kernel"], sweep=functions["sweep"])

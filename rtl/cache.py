@@ -110,12 +110,14 @@ class Cache(wiring.Component):
         repeated = [Signal(name=f"lookup_repeated{stage}", reset_less=stage > 0) for stage in range(3)]
         again = Signal()
         room = Signal()
+        yielding = [Signal(name=f"lookup_yields{stage}") for stage in range(3)]
         promised = Signal(range(_ANSWERS_DEPTH + 3))
         m.d.comb += [
-            # Any lookup under way may become an answer. One place is left for a filled line, which takes its
-            # turn when no answer comes from the lookup: while one waits, no lookup begins.
+            # Any lookup under way may become an answer. A filled line takes its turn when the lookup has no
+            # answer; so that there is such a cycle for each, a lookup is left out.
             promised.eq(answers.level + valid[1] + valid[2]),
-            room.eq((promised < _ANSWERS_DEPTH - 1) & ~filled.o.valid),
+            yielding[0].eq(filled.level > yielding[1] + yielding[2]),
+            room.eq((promised < _ANSWERS_DEPTH - 1) & ~yielding[0]),
             requests[0].eq(Mux(again, head.request, self.request.payload)),
             repeated[0].eq(again),
             valid[0].eq(room & (again | self.request.valid)),
@@ -128,6 +130,7 @@ class Cache(wiring.Component):
                 requests[stage].eq(requests[stage - 1]),
                 valid[stage].eq(valid[stage - 1]),
                 repeated[stage].eq(repeated[stage - 1]),
+                yielding[stage].eq(yielding[stage - 1]),
             ]
         # A second register after the memories: block RAM is slow from clock to output.
         tag = Signal(tag_layout, reset_less=True)

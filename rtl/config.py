@@ -16,6 +16,9 @@ class ChipConfig:
     ----------
     fmt : :class:`~fpu.FloatFormat`
         Format of every floating-point number on the chip.
+    add_latency, mul_latency, div_latency, cmp_latency : int
+        Pipeline stages of the operators. Fewer than the operators' own defaults, which are for 175 MHz alone: each
+        stage of a kd-step is one more that a thread waits in, and the whole chip is to run at 100 to 125 MHz.
     num_threads : int
         Packets in flight, 1…64.
     stack_depth : int
@@ -40,6 +43,10 @@ class ChipConfig:
     """
 
     fmt: FloatFormat = field(default_factory=lambda: FloatFormat(7, 16))
+    add_latency: int = 6
+    mul_latency: int = 3
+    div_latency: int = 14
+    cmp_latency: int = 1
     num_threads: int = 64
     stack_depth: int = 32
     mailbox_entries: int = 4
@@ -54,6 +61,7 @@ class ChipConfig:
 
     def __post_init__(self):
         ranges = {
+            "add_latency": (0, 32), "mul_latency": (0, 32), "div_latency": (0, 64), "cmp_latency": (0, 8),
             "num_threads": (1, 64), "stack_depth": (1, 64), "mailbox_entries": (0, 16),
             "node_lines": (2, 1 << 16), "node_line_items": (1, 8), "list_lines": (2, 1 << 16),
             "list_line_items": (1, 16), "matrix_lines": (2, 1 << 16), "num_fetches": (1, 16),
@@ -66,3 +74,8 @@ class ChipConfig:
         for name in ("node_lines", "list_lines", "matrix_lines", "node_line_items", "list_line_items"):
             if getattr(self, name).bit_count() != 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be a power of two")
+
+    @property
+    def latencies(self):
+        """The operators' latencies as a :class:`~fpu.Datapath` takes them."""
+        return {"add": self.add_latency, "mul": self.mul_latency, "div": self.div_latency, "cmp": self.cmp_latency}

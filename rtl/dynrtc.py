@@ -117,6 +117,7 @@ class DynRTC(wiring.Component):
         fmt = config.fmt
         token = dict(num_threads=config.num_threads, stack_depth=config.stack_depth)
         widths = dict(**token, index_width=config.index_width)
+        floats = dict(fmt=fmt, latencies=config.latencies)
         cache = dict(num_waiting=config.num_threads, num_fetches=config.num_fetches, index_width=config.index_width)
         caches = {
             "nodes": Cache(item_width=NODE_BITS, payload_shape=self._token, num_lines=config.node_lines,
@@ -128,11 +129,11 @@ class DynRTC(wiring.Component):
         }
         rays = RayGeneration(**token, coord_width=config.coord_width)
         store = RayStore(fmt=fmt, num_threads=config.num_threads)
-        stack = TraversalStack(fmt=fmt, **widths)
-        traversal = Traversal(fmt=fmt, **widths)
+        stack = TraversalStack(**floats, **widths)
+        traversal = Traversal(**floats, **widths)
         mailboxed_list = MailboxedList(mailbox_entries=config.mailbox_entries, **widths)
-        transformation = Transformation(fmt=fmt, coord_width=config.coord_width, **widths)
-        intersection = Intersection(fmt=fmt, **widths)
+        transformation = Transformation(**floats, coord_width=config.coord_width, **widths)
+        intersection = Intersection(**floats, **widths)
         write_out = WriteOut(fmt=fmt, coord_width=config.coord_width, **widths)
         for name, cache in caches.items():
             m.submodules[f"{name}_cache"] = cache

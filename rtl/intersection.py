@@ -55,6 +55,8 @@ class Intersection(wiring.Component):
         Format of coordinates.
     num_threads, stack_depth, index_width : int
         See :class:`~rtl.config.ChipConfig`.
+    latencies : dict
+        Of the operators, see :class:`~fpu.Datapath`.
 
     Members
     -------
@@ -67,8 +69,9 @@ class Intersection(wiring.Component):
     busy : a ray is taken in
     """
 
-    def __init__(self, *, fmt, num_threads, stack_depth, index_width):
+    def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None):
         self._fmt = fmt
+        self._latencies = latencies
         self._num_threads = num_threads
         self._index_width = index_width
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
@@ -89,7 +92,7 @@ class Intersection(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         num_slots = 1 << ceil_log2(self._num_threads)
-        graph = unit_triangle(self._fmt)
+        graph = unit_triangle(self._fmt, latencies=self._latencies)
         m.submodules.test = test = graph.component()
 
         vector = self.vector.payload

@@ -32,6 +32,8 @@ class TraversalStack(wiring.Component):
         Format of ray parameters.
     num_threads, stack_depth, index_width : int
         See :class:`~rtl.config.ChipConfig`.
+    latencies : dict
+        Of the operators, see :class:`~fpu.Datapath`.
 
     Members
     -------
@@ -43,8 +45,9 @@ class TraversalStack(wiring.Component):
     popped_address, popped_intervals : thread and level; two cycles later, the intervals that it popped last
     """
 
-    def __init__(self, *, fmt, num_threads, stack_depth, index_width):
+    def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None):
         self._fmt = fmt
+        self._latencies = latencies
         self._num_threads = num_threads
         self._stack_depth = stack_depth
         self._token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
@@ -106,7 +109,7 @@ class TraversalStack(wiring.Component):
             self.hit_address.eq(token.thread),
         ]
 
-        comparators = [worth_visiting(self._fmt).component() for _ in range(PACKET_RAYS)]
+        comparators = [worth_visiting(self._fmt, latencies=self._latencies).component() for _ in range(PACKET_RAYS)]
         latency = comparators[0].latency
         stages = 2 + latency
         entry = [Signal(entry_layout, name=f"entry{k}", reset_less=True) for k in range(latency + 1)]

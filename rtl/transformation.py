@@ -52,6 +52,8 @@ class Transformation(wiring.Component):
         Format of coordinates.
     num_threads, stack_depth, index_width, coord_width : int
         See :class:`~rtl.config.ChipConfig`.
+    latencies : dict
+        Of the operators, see :class:`~fpu.Datapath`.
 
     Members
     -------
@@ -67,8 +69,9 @@ class Transformation(wiring.Component):
     busy : a vector is taken in
     """
 
-    def __init__(self, *, fmt, num_threads, stack_depth, index_width, coord_width):
+    def __init__(self, *, fmt, num_threads, stack_depth, index_width, coord_width, latencies=None):
         self._fmt = fmt
+        self._latencies = latencies
         self._half_width = coord_width + 2
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         self._job = with_token(token, index=index_width, instance=1)
@@ -181,7 +184,7 @@ class Transformation(wiring.Component):
         with m.Else():
             m.d.comb += vector.eq(self.stored_vector)
 
-        m.submodules.map = mapping = affine_map(self._fmt).component()
+        m.submodules.map = mapping = affine_map(self._fmt, latencies=self._latencies).component()
         m.d.comb += mapping.is_point.eq(to_map.o.step.is_origin)
         for axis in "xyz":
             m.d.comb += [

@@ -64,6 +64,8 @@ class Traversal(wiring.Component):
         Format of coordinates and ray parameters.
     num_threads, stack_depth, index_width : int
         See :class:`~rtl.config.ChipConfig`.
+    latencies : dict
+        Of the operators, see :class:`~fpu.Datapath`.
 
     Members
     -------
@@ -77,8 +79,9 @@ class Traversal(wiring.Component):
     busy : a step begins
     """
 
-    def __init__(self, *, fmt, num_threads, stack_depth, index_width):
+    def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None):
         self._fmt = fmt
+        self._latencies = latencies
         self._num_threads = num_threads
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         self._node = node_layout(fmt=fmt, index_width=index_width)
@@ -101,8 +104,8 @@ class Traversal(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        steps = [kd_step(self._fmt).component() for _ in range(PACKET_RAYS)]
-        graph = kd_step(self._fmt)
+        steps = [kd_step(self._fmt, latencies=self._latencies).component() for _ in range(PACKET_RAYS)]
+        graph = kd_step(self._fmt, latencies=self._latencies)
         read_latency = RayStore.read_latency
         # The interval's address goes out so much before the interval is wanted, as the rays' did before them.
         fetch_at = graph.inputs["t_near"].start

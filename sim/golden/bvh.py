@@ -1,4 +1,7 @@
-"""A bounding volume hierarchy by the binned surface-area heuristic (Wald: On fast construction of SAH-based BVHs, RT 2007)."""
+"""A bounding volume hierarchy by the binned surface-area heuristic.
+
+Wald: On fast construction of SAH-based bounding volume hierarchies, RT 2007.
+"""
 
 from typing import NamedTuple
 

@@ -12,6 +12,13 @@ _GLB_MAGIC, _JSON_CHUNK, _BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 _REQUIRED = object()
 
 
+def _is_finite(value):
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond the largest float
+        return False
+
+
 class Element:
     """A JSON object with its place in the file; every getter raises SceneError naming that place.
 
@@ -60,7 +67,7 @@ class Element:
     def real(self, key, default=_REQUIRED):
         """A finite number."""
         value = self._get(key, default, (int, float), "a number")
-        if value is not default and not math.isfinite(value):
+        if value is not default and not _is_finite(value):
             raise self.error(f"'{key}' must be finite, it is {value}")
         return value
 
@@ -68,7 +75,7 @@ class Element:
         """A list of ``length`` finite numbers."""
         value = self._get(key, default, (list,), f"a list of {length} numbers")
         if value is not default and (len(value) != length or not all(
-                isinstance(x, (int, float)) and not isinstance(x, bool) and math.isfinite(x) for x in value)):
+                isinstance(x, (int, float)) and not isinstance(x, bool) and _is_finite(x) for x in value)):
             raise self.error(f"'{key}' must be a list of {length} finite numbers, not {value!r}")
         return value
 

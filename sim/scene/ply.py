@@ -37,8 +37,10 @@ class _Element:
 def _read_header(path, data):
     """(format, elements, bytes of the header)."""
     end = data.find(b"end_header")
-    if not data.startswith(b"ply") or end < 0:
-        raise SceneError(f"{path}: not a PLY file: {'no end_header' if data.startswith(b'ply') else 'no ply in line 1'}")
+    if not data.startswith(b"ply"):
+        raise SceneError(f"{path}: not a PLY file: no ply in line 1")
+    if end < 0:
+        raise SceneError(f"{path}: not a PLY file: no end_header")
     size = data.find(b"\n", end) + 1 or len(data)
     form, elements = None, []
     for number, line in enumerate(data[:size].decode("latin-1").splitlines(), start=1):
@@ -147,10 +149,10 @@ def _faces(body, element):
     faces = []
     for _ in range(element.count):
         for i, prop in enumerate(element.properties):
-            count = 1 if prop.length is None else int(body.scalar(element, prop.length))
-            if count < 0:
-                raise SceneError(f"{body.path}: face {len(faces)} has a list of length {count}")
-            values = body.vector(element, prop.dtype, count)
+            count = 1 if prop.length is None else body.scalar(element, prop.length)
+            if not 0 <= count < np.inf:
+                raise SceneError(f"{body.path}: face {len(faces)} has a list of length {count:g}")
+            values = body.vector(element, prop.dtype, int(count))
             if i == wanted:
                 faces.append(values.astype(np.int64))
     return faces

@@ -31,7 +31,7 @@ def pack(sign, magnitude, exp_width, frac_width, truncate=False):
     if magnitude < Fraction(2) ** scale:
         scale -= 1
     units, rest = divmod(magnitude * Fraction(2) ** (frac_width - scale), 1)
-    if not truncate and (rest > Fraction(1, 2) or rest == Fraction(1, 2) and units % 2 == 1):
+    if not truncate and (rest > Fraction(1, 2) or (rest == Fraction(1, 2) and units % 2 == 1)):
         units += 1
     if units == 2 ** (frac_width + 1):
         units //= 2
@@ -69,7 +69,7 @@ def multiply(a, b, *fmt, truncate=False):
 
 def divide(a, b, *fmt, truncate=False):
     (sign_a, a), (sign_b, b) = unpack(a, *fmt), unpack(b, *fmt)
-    if isinf(a) and isinf(b) or a == b == 0:
+    if (isinf(a) and isinf(b)) or a == b == 0:
         return 0
     if isinf(a) or b == 0:
         return pack(sign_a ^ sign_b, inf, *fmt)

@@ -20,7 +20,8 @@ def test_balance(latency):
         registers = balance(weights, latency=latency)
         assert sum(registers) == latency
         assert registers[-1] == 1
-        placements = ([int(step in (*chosen, 5)) for step in range(6)] for chosen in combinations(range(5), latency - 1))
+        choices = combinations(range(5), latency - 1)
+        placements = ([int(step in (*chosen, 5)) for step in range(6)] for chosen in choices)
         assert max(stages(weights, registers)) == min(max(stages(weights, placement)) for placement in placements)
 
 

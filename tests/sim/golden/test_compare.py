@@ -55,7 +55,8 @@ def test_the_same_triangle_of_another_instance_is_wrong(golden):
 @pytest.mark.parametrize("values", [dict(instance_id=-1, prim_id=-1, t=np.inf), dict(prim_id=4, t=9.0), dict(t=8.1)])
 def test_cracks(golden, values):
     result = compare(golden, changed(golden, (1, 0), **values))
-    assert result.num_cracks == 1 and result.num_ambiguous == 0
+    assert result.num_cracks == 1
+    assert result.num_ambiguous == 0
 
 
 def test_something_in_front_is_no_crack(golden):

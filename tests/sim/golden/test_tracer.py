@@ -64,7 +64,8 @@ def assert_agree(scene, origins, directions):
     with np.errstate(invalid="ignore"):
         clear = differ & ~(np.abs(second.t - hits.t) <= 1e-5 * hits.t)
         far = (hits.t != t) & ~(np.abs(hits.t - t) <= 1e-4 * hits.t)
-    assert clear.mean() <= 1e-4 and far.mean() <= 1e-4
+    assert clear.mean() <= 1e-4
+    assert far.mean() <= 1e-4
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -101,7 +102,9 @@ def test_hit_point_is_as_defined():
         instance = scene.instances[hits.instance_id[i]]
         v0, v1, v2 = scene.meshes[instance.mesh].vertices.reshape(-1, 3, 3)[hits.prim_id[i]]
         u, v = hits.u[i], hits.v[i]
-        assert u >= 0 and v >= 0 and u + v <= 1 + 1e-15
+        assert u >= 0
+        assert v >= 0
+        assert u + v <= 1 + 1e-15
         point = instance.transform @ [*((1 - u - v) * v0 + u * v1 + v * v2), 1.0]
         assert point == pytest.approx(origins[i] + hits.t[i] * directions[i], abs=1e-9)
         normal = np.cross(v1 - v0, v2 - v0)
@@ -110,7 +113,8 @@ def test_hit_point_is_as_defined():
 
 
 def test_misses_are_marked():
-    hits = trace(one_mesh_scene([[(0, 0, 1), (1, 0, 1), (0, 1, 1)]]), np.zeros(3), [(0.9, 0.9, 1.0), (0, 0, -1), (0, 0, 0)])
+    scene = one_mesh_scene([[(0, 0, 1), (1, 0, 1), (0, 1, 1)]])
+    hits = trace(scene, np.zeros(3), [(0.9, 0.9, 1.0), (0, 0, -1), (0, 0, 0)])
     assert hits.instance_id.tolist() == hits.prim_id.tolist() == [-1, -1, -1]
     assert hits.t.tolist() == [np.inf] * 3
     assert hits.u.tolist() == hits.v.tolist() == hits.dot.tolist() == [0, 0, 0]
@@ -120,7 +124,8 @@ def test_both_sides_are_hit_with_the_sign_in_dot():
     scene = one_mesh_scene([[(0, 0, 0), (1, 0, 0), (0, 1, 0)]])
     hits = trace(scene, [(0.25, 0.5, 2), (0.25, 0.5, -2)], [(0, 0, -4), (0, 0, 4)])
     assert hits.t.tolist() == [0.5, 0.5]
-    assert hits.u.tolist() == [0.25, 0.25] and hits.v.tolist() == [0.5, 0.5]
+    assert hits.u.tolist() == [0.25, 0.25]
+    assert hits.v.tolist() == [0.5, 0.5]
     assert hits.dot.tolist() == [-4, 4]
 
 
@@ -190,7 +195,8 @@ def test_rays_along_axes_through_shared_edges_hit():
     squares += [[(x, y, 1), (x + 1, y + 1, 1), (x, y + 1, 1)] for x in range(4) for y in range(4)]
     origins = np.stack(np.broadcast_arrays(*np.mgrid[0:4.25:0.25, 0:4.25:0.25], 0.0), axis=-1)
     hits = trace(one_mesh_scene(squares), origins, (0.0, 0.0, 1.0))
-    assert hits.is_hit.all() and (hits.t == 1).all()
+    assert hits.is_hit.all()
+    assert (hits.t == 1).all()
 
 
 def test_animation_moves_only_the_instances():
@@ -200,7 +206,8 @@ def test_animation_moves_only_the_instances():
     rng = np.random.default_rng(1)
     origins, directions = rng.uniform(-6, 6, (500, 3)), rng.normal(size=(500, 3))
     here, there = trace(scene, origins, directions), trace(moved, origins + np.array((5.0, 0, 0)), directions)
-    assert (here.prim_id == there.prim_id).all() and here.is_hit.any()
+    assert (here.prim_id == there.prim_id).all()
+    assert here.is_hit.any()
     assert there.t == pytest.approx(here.t, rel=1e-9)
 
 
@@ -210,5 +217,6 @@ def test_picture_has_the_shape_and_orientation_of_the_convention():
     hits = render(scene, Camera((0, 0, 0), (0, 1, 0), (0, 0, 1), 60.0), 64, 48)
     assert hits.t.shape == (48, 64)
     rows, columns = np.nonzero(hits.is_hit)
-    assert rows.max() < 24 and columns.min() >= 32
+    assert rows.max() < 24
+    assert columns.min() >= 32
     assert hits.t[rows[0], columns[0]] == pytest.approx(5.0)

@@ -66,7 +66,8 @@ def test_all_forms_of_corners_in_one_file(load):
 
 def test_mesh_without_attributes_has_none(load):
     (mesh,) = load(TRIANGLE + "f 1 2 3").meshes
-    assert mesh.uvs is None and mesh.normals is None
+    assert mesh.uvs is None
+    assert mesh.normals is None
 
 
 def test_comments_tabs_continuations_and_line_ends(load):
@@ -103,7 +104,7 @@ def test_unusable_triangles_are_kept_counted_and_reported(load):
     assert "test.obj:2: vertex is not finite (1 such in the file)" in scene.warnings[0]
 
 
-@pytest.mark.parametrize("text, message", [
+@pytest.mark.parametrize(("text", "message"), [
     ("v 0 0\n", r"test.obj:1: 'v' needs 3 numbers, has 2"),
     ("v 0 0 0\nv 0 x1 0\n", r"test.obj:2: 'x1' is not a number"),
     (TRIANGLE + "vt 1\nf 1 2 3\n", r"test.obj:4: 'vt' needs 2 numbers, has 1"),
@@ -128,16 +129,17 @@ def test_errors_name_the_line(load, text, message):
         load(text)
 
 
-@pytest.mark.parametrize("text, message", [
+@pytest.mark.parametrize(("text", "message"), [
     ("Kd 1 1 1\n", r"a.mtl:1: 'Kd' before any newmtl"), ("newmtl a\nKd 1 x 1\n", r"a.mtl:2: .*'x'"),
-    ("newmtl a\nKd 1 1\n", r"a.mtl:2: 'Kd' needs three finite"), ("newmtl a\nKd 1 1 nan\n", r"a.mtl:2: 'Kd' needs three"),
+    ("newmtl a\nKd 1 1\n", r"a.mtl:2: 'Kd' needs three finite"),
+    ("newmtl a\nKd 1 1 nan\n", r"a.mtl:2: 'Kd' needs three"),
 ])
 def test_errors_in_materials_name_the_line(load, text, message):
     with pytest.raises(SceneError, match=message):
         load("mtllib a.mtl\n" + TRIANGLE + "f 1 2 3\n", a_mtl=text)
 
 
-@pytest.mark.parametrize("name, num_triangles, num_objects", [
+@pytest.mark.parametrize(("name", "num_triangles", "num_objects"), [
     ("scene6_simple_room/simple_room.obj", 806, 10), ("office_laas_grande_salle/grande_salle.obj", 43296, 39),
     ("classic/stanford-bunny.obj", 69451, 1), ("trees/bush/bush.obj", 40292, 3),
     ("conference/conference.obj", 284884, 54)])

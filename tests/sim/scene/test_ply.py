@@ -50,14 +50,15 @@ VARIANTS = {
 }
 
 
-@pytest.mark.parametrize("shape, faces", [("triangles", TRIANGLES), ("mixed", MIXED)])
+@pytest.mark.parametrize(("shape", "faces"), [("triangles", TRIANGLES), ("mixed", MIXED)])
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("compressed", [False, True])
 def test_variants(load, shape, faces, variant, compressed):
     data = VARIANTS[variant](faces)
     scene = load(gzip.compress(data), "test.ply.gz") if compressed else load(data)
     (mesh,) = scene.meshes
-    assert mesh.name == "test" and len(scene.instances) == 1
+    assert mesh.name == "test"
+    assert len(scene.instances) == 1
     assert mesh.triangles.tolist() == EXPECTED[shape]
     assert (mesh.vertices == np.array(POINTS)).all()
 
@@ -68,10 +69,11 @@ def test_extra_elements_and_properties_are_passed_over(load):
             b"property uchar flag\nproperty list uchar int vertex_indices\nproperty list uchar float w\nend_header\n"
             b"7 7 7 7\n9 0 0 0\n9 1 0 0\n9 0 1 0\n5 3 0 1 2 2 0.5 0.5\n")
     (mesh,) = load(text).meshes
-    assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]] and mesh.triangles.tolist() == [[0, 1, 2]]
+    assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    assert mesh.triangles.tolist() == [[0, 1, 2]]
 
 
-@pytest.mark.parametrize("kind, full", [("uchar", 255), ("float", 1.0)])
+@pytest.mark.parametrize(("kind", "full"), [("uchar", 255), ("float", 1.0)])
 def test_vertex_colors_become_materials(load, kind, full):
     text = (f"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
             f"property {kind} red\nproperty {kind} green\nproperty {kind} blue\nelement face 2\n"
@@ -86,7 +88,7 @@ def test_vertex_colors_become_materials(load, kind, full):
 GOOD = ascii_file(TRIANGLES)
 
 
-@pytest.mark.parametrize("data, message", [
+@pytest.mark.parametrize(("data", "message"), [
     (b"plx\n", "not a PLY file: no ply in line 1"),
     (b"ply\nformat ascii 1.0\n", "not a PLY file: no end_header"),
     (GOOD.replace(b"ascii 1.0", b"ascii 2.0"), "test.ply:2: 'format ascii 2.0' is not understood"),
@@ -102,8 +104,9 @@ GOOD = ascii_file(TRIANGLES)
     (GOOD.replace(b"vertex_indices", b"corners"), "no list 'vertex_indices'"),
     (GOOD.replace(b"element face", b"element edge"), "element 'edge' with a list is not supported"),
     (ascii_file([]), "scene is empty"),
-    (b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n",
-     "no element 'face'"),
+    (b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n", "lacks x, y or z"),
+    (GOOD.replace(b"3 2 3 0", b"nan 2 3 0"), "face 1 has a list of length nan"),
+    (b"ply\nformat ascii 1.0\nelement point 1\nproperty float x\nend_header\n0\n", "no element 'face'"),
     (binary_file(TRIANGLES, "<")[:-5], "ends within element 'face' of 2; it is cut short"),
     (binary_file(TRIANGLES, "<").replace(b"vertex 5", b"vertex 4000000000"), "cut short"),
     (binary_file(MIXED, ">").replace(b"face 2", b"face 2000000000"), "cut short"),

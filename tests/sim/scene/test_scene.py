@@ -42,11 +42,13 @@ def test_basis_is_right_handed_and_unit():
 
 def test_camera_is_parsed():
     camera = Camera.parse("1,2,3, 4,5,6.5, 0,0,1, 60")
-    assert camera.eye.tolist() == [1, 2, 3] and camera.at.tolist() == [4, 5, 6.5]
-    assert camera.up.tolist() == [0, 0, 1] and camera.hfov_deg == 60
+    assert camera.eye.tolist() == [1, 2, 3]
+    assert camera.at.tolist() == [4, 5, 6.5]
+    assert camera.up.tolist() == [0, 0, 1]
+    assert camera.hfov_deg == 60
 
 
-@pytest.mark.parametrize("text, message", [
+@pytest.mark.parametrize(("text", "message"), [
     ("0,0,0,0,0,0,0,0,1,60", "zero direction"), ("0,0,0,0,0,5,0,0,1,60", "parallel"),
     ("0,0,0,0,0,5,0,0,-1e-9,60", "parallel"), ("0,0,0,1,0,0,0,0,0,60", "up vector is zero"),
     ("0,0,0,1,0,0,0,0,1,0", r"within \(0, 180\)"), ("0,0,0,1,0,0,0,0,1,180", r"within \(0, 180\)"),
@@ -61,10 +63,11 @@ def test_bad_cameras(text, message):
 def test_bounds_are_those_of_the_placed_usable_triangles():
     mesh = mesh_of([[(0, 0, 0), (1, 0, 0), (0, 2, 0)], [(5, 5, 5), (5, 5, 5), (6, 6, 6)], [(np.nan, 9, 9)] * 3])
     lower, upper = scene_of([[0, -1, 0, 10], [1, 0, 0, 0], [0, 0, 2, 3]], mesh).bounds()
-    assert lower.tolist() == [8, 0, 3] and upper.tolist() == [10, 1, 3]
+    assert lower.tolist() == [8, 0, 3]
+    assert upper.tolist() == [10, 1, 3]
 
 
-@pytest.mark.parametrize("extent, up", [((4, 5, 2.5), (0, 0, 1)), ((1, 1, 0.9), (0, 1, 0)), ((1, 3, 1), (0, 1, 0))])
+@pytest.mark.parametrize(("extent", "up"), [((4, 5, 2.5), (0, 0, 1)), ((1, 1, 0.9), (0, 1, 0)), ((1, 3, 1), (0, 1, 0))])
 def test_default_camera_sees_the_whole_scene(extent, up):
     x, y, z = extent
     scene = scene_of(np.eye(3, 4), mesh_of([[(0, 0, 0), (x, 0, z), (0, y, 0)], [(x, y, z), (0, 0, z), (x, y, 0)]]))
@@ -74,7 +77,8 @@ def test_default_camera_sees_the_whole_scene(extent, up):
     for corner in itertools.product((0, x), (0, y), (0, z)):
         offset = corner - camera.eye
         half_width = np.tan(np.radians(camera.hfov_deg) / 2) * (offset @ forward)
-        assert abs(offset @ right) < half_width and abs(offset @ up) < 0.75 * half_width
+        assert abs(offset @ right) < half_width
+        assert abs(offset @ up) < 0.75 * half_width
 
 
 @pytest.mark.parametrize("transform", [
@@ -104,10 +108,12 @@ def test_nothing_to_hit(corners):
 
 def test_still_scene_is_the_same_at_any_time():
     scene = scene_of(np.eye(3, 4))
-    assert not scene.is_animated and scene.duration == 0 and scene.at_time(3.0) is scene
+    assert not scene.is_animated
+    assert scene.duration == 0
+    assert scene.at_time(3.0) is scene
 
 
-@pytest.mark.parametrize("corners, usable", [
+@pytest.mark.parametrize(("corners", "usable"), [
     ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], True), ([(0, 0, 0), (1, 0, 0), (2, 0, 0)], False),
     ([(0.1, 0.2, 0.3), (0.2, 0.4, 0.6), (0.4, 0.8, 1.2)], False), ([(1, 2, 3)] * 3, False),
     ([(1, 2, 3), (1, 2, 3), (4, 5, 6)], False), ([(0, 0, 0), (1e-200, 0, 0), (0, 1e-200, 0)], True),
@@ -121,12 +127,15 @@ def test_usable_triangles(corners, usable):
 def test_room_is_as_large_as_the_papers_scene():
     scene = room_scene()
     (mesh,) = scene.meshes
-    assert scene.num_triangles == 806 and len(scene.instances) == 1
+    assert scene.num_triangles == 806
+    assert len(scene.instances) == 1
     assert mesh.usable.all()
-    assert set(mesh.material_ids) == set(range(len(scene.materials))) and len(scene.materials) >= 8
+    assert set(mesh.material_ids) == set(range(len(scene.materials)))
+    assert len(scene.materials) >= 8
     lower, upper = scene.bounds()
     eye = scene.default_camera().eye
-    assert (lower < eye).all() and (eye < upper).all()
+    assert (lower < eye).all()
+    assert (eye < upper).all()
     assert load_scene("room").num_triangles == 806
 
 
