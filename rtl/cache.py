@@ -7,7 +7,7 @@ from amaranth.utils import exact_log2
 
 from .queue import Queue
 
-__all__ = ["Cache", "WORD_WIDTH"]
+__all__ = ["WORD_WIDTH", "Cache"]
 
 #: Bits of a memory word.
 WORD_WIDTH = 32

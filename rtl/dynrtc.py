@@ -19,7 +19,7 @@ from .transformation import Transformation
 from .traversal import Traversal
 from .write_out import WriteOut, pixel_layout
 
-__all__ = ["DynRTC", "COUNTERS", "UNITS", "CACHES"]
+__all__ = ["CACHES", "COUNTERS", "UNITS", "DynRTC", "line_words"]
 
 #: The three caches, by what they keep.
 CACHES = ("nodes", "lists", "matrices")
@@ -31,6 +31,16 @@ COUNTERS = ("cycles", "packets", "busy_traversal", "busy_list", "busy_transforma
 #: Where a thread can be, in the order of the bits of ``probe``.
 UNITS = ("ray generation", "node cache", "traversal", "stack", "list cache", "mailboxed list", "matrix cache",
          "transformation", "intersection", "write-out")
+
+
+def line_words(config):
+    """Words in a line of each of a chip's memories: what one request asks for."""
+    return {
+        "nodes": config.node_line_items * NODE_BITS // WORD_WIDTH,
+        "lists": config.list_line_items,
+        "matrices": -(-matrix_layout(config.fmt).size // WORD_WIDTH),
+        "shading": 1,
+    }
 
 
 class DynRTC(wiring.Component):
@@ -87,16 +97,6 @@ class DynRTC(wiring.Component):
                                           len(UNITS))),
         })
 
-    @property
-    def line_words(self):
-        """Words in a line of each memory: what a request asks for."""
-        return {
-            "nodes": self.config.node_line_items * NODE_BITS // WORD_WIDTH,
-            "lists": self.config.list_line_items,
-            "matrices": -(-matrix_layout(self.config.fmt).size // WORD_WIDTH),
-            "shading": 1,
-        }
-
     def _queue(self, m, name, source, shape):
         """A queue after ``source``, with room for every thread's token."""
         queue = Queue(shape, depth=self.config.num_threads, always_ready=True)
@@ -107,7 +107,7 @@ class DynRTC(wiring.Component):
     def _merge(self, m, name, sources, shape):
         merge = Merge(shape, num_inputs=len(sources))
         m.submodules[f"{name}_merge"] = merge
-        for source, target in zip(sources, merge.i):
+        for source, target in zip(sources, merge.i, strict=True):
             wiring.connect(m, source, target)
         return merge.o
 

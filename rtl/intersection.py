@@ -9,7 +9,7 @@ from fpu import Datapath, Delay
 
 from .layout import PACKET_RAYS, token_layout, vector_layout, with_token
 
-__all__ = ["Intersection", "unit_triangle", "hit_layout"]
+__all__ = ["Intersection", "hit_layout", "unit_triangle"]
 
 
 def unit_triangle(fmt, *, latencies=None):

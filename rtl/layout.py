@@ -2,8 +2,20 @@
 
 from amaranth.lib import data, enum
 
-__all__ = ["PACKET_RAYS", "NODE_BITS", "IntervalSource", "Axis", "token_layout", "with_token", "node_layout",
-           "list_entry_layout", "matrix_layout", "vector_layout", "interval_layout", "camera_layout"]
+__all__ = [
+    "NODE_BITS",
+    "PACKET_RAYS",
+    "Axis",
+    "IntervalSource",
+    "camera_layout",
+    "interval_layout",
+    "list_entry_layout",
+    "matrix_layout",
+    "node_layout",
+    "token_layout",
+    "vector_layout",
+    "with_token",
+]
 
 #: Rays in a packet: a square of 2×2 pixels, ray r at (r & 1, r >> 1).
 PACKET_RAYS = 4
@@ -42,7 +54,7 @@ def token_layout(*, num_threads, stack_depth):
     hit : per ray, whether the thread's hit store holds a hit (else its distance counts as infinite)
     mask : per ray, whether it takes part
     sp : stack entries in use at this level
-    interval, interval_level : where [t_near, t_far] of the rays is kept
+    interval : where [t_near, t_far] of the rays is kept
     """
     return data.StructLayout({
         "thread": range(num_threads),
@@ -51,7 +63,6 @@ def token_layout(*, num_threads, stack_depth):
         "mask": PACKET_RAYS,
         "sp": range(stack_depth + 1),
         "interval": IntervalSource,
-        "interval_level": 1,
     })
 
 

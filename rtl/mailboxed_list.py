@@ -16,8 +16,9 @@ class MailboxedList(wiring.Component):
 
     A triangle often lies in several leaves. The mailbox of a packet remembers its last few triangles and the
     rays tested against each; rays that were tested are left out, and a triangle without rays left is skipped.
-    It is emptied when the packet enters an instance, whose triangles are others each time, and when the thread
-    begins anew. Instances are not remembered: a packet enters one with the interval of one leaf only.
+    Instances are remembered like triangles: a ray enters one with its whole length, not with the part of it in
+    the leaf, so once is enough. Each level has a mailbox; the one of the instances' triangles is emptied when
+    an instance is entered, the one of the scene when the thread begins anew.
 
     An entry takes one cycle; from an entry to the job for it pass 2.
 
@@ -58,23 +59,21 @@ class MailboxedList(wiring.Component):
             "busy": Out(1),
         })
 
-    def _look_up_mailbox(self, m, *, thread, index, mask, forget, valid):
-        """The rays of ``mask`` that are yet to be tested; remembers that they will have been."""
+    def _mailbox(self, m, level, *, thread, index, mask, post, clear, clear_thread):
+        """The mailbox of one level: the rays of ``mask`` that have been tested; ``post`` adds the others."""
         letter_layout = data.StructLayout({"index": self._index_width, "rays": PACKET_RAYS})
         count = self._mailbox_entries
         box_layout = data.StructLayout({"letters": data.ArrayLayout(letter_layout, count), "next": range(count)})
-        m.submodules.mailboxes = mailboxes = memory.Memory(
+        m.submodules[f"mailboxes{level}"] = mailboxes = memory.Memory(
             shape=box_layout, depth=1 << ceil_log2(self._num_threads), init=[])
         read, write = mailboxes.read_port(domain="comb"), mailboxes.write_port()
-        found = Signal(count)
-        tested = Signal(PACKET_RAYS)
-        untested = Signal(PACKET_RAYS)
+        found = Signal(count, name=f"found{level}")
+        tested = Signal(PACKET_RAYS, name=f"tested{level}")
         box = read.data
         m.d.comb += [
             read.addr.eq(thread),
-            write.addr.eq(Mux(self.begin.valid, self.begin.thread, thread)),
-            write.en.eq(valid | self.begin.valid),
-            untested.eq(mask & ~tested),
+            write.addr.eq(Mux(clear, clear_thread, thread)),
+            write.en.eq(post | clear),
         ]
         for number in range(count):
             letter = box.letters[number]
@@ -82,10 +81,10 @@ class MailboxedList(wiring.Component):
             m.d.comb += found[number].eq((letter.index == index) & letter.rays.any())
             with m.If(found[number]):
                 m.d.comb += tested.eq(letter.rays)
-        with m.If(~forget & ~self.begin.valid):
+        with m.If(~clear):
             m.d.comb += write.data.eq(box)
             for number in range(count):
-                put = Signal(name=f"put{number}")
+                put = Signal(name=f"put{level}_{number}")
                 m.d.comb += put.eq(Mux(found.any(), found[number], box.next == number))
                 with m.If(put):
                     m.d.comb += [
@@ -94,7 +93,7 @@ class MailboxedList(wiring.Component):
                     ]
             with m.If(~found.any()):
                 m.d.comb += write.data.next.eq(Mux(box.next == count - 1, 0, box.next + 1))
-        return untested
+        return tested
 
     def elaborate(self, platform):
         m = Module()
@@ -148,14 +147,17 @@ class MailboxedList(wiring.Component):
         ]
         looking = Signal()
         m.d.comb += [looking.eq(self.entry.valid & self.entry.ready), self.busy.eq(looking)]
-        if self._mailbox_entries:
-            untested = self._look_up_mailbox(m, thread=token.thread, index=entry.index, mask=token.mask,
-                                             forget=entry.instance, valid=looking)
-        else:
-            untested = token.mask
         wanted = Signal(PACKET_RAYS)
+        m.d.comb += wanted.eq(token.mask)
+        if self._mailbox_entries:
+            common = dict(thread=token.thread, index=entry.index, mask=token.mask)
+            in_scene = self._mailbox(m, 0, **common, post=looking & ~token.level, clear=self.begin.valid,
+                                     clear_thread=self.begin.thread)
+            # Only the scene's own list has instances, so this never clears what is posted at the same time.
+            in_instance = self._mailbox(m, 1, **common, post=looking & token.level,
+                                        clear=looking & entry.instance, clear_thread=token.thread)
+            m.d.comb += wanted.eq(token.mask & ~Mux(token.level, in_instance, in_scene))
         m.d.comb += [
-            wanted.eq(Mux(entry.instance, token.mask, untested)),
             context_write.addr.eq(Cat(token.level, token.thread)),
             context_write.data.token.eq(token),
             context_write.data.list.eq(following),

@@ -4,7 +4,7 @@ from amaranth.hdl import Assert, Module, Shape, Signal
 from amaranth.lib import fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-__all__ = ["Queue", "Merge"]
+__all__ = ["Merge", "Queue"]
 
 
 class Queue(wiring.Component):

@@ -8,7 +8,7 @@ from amaranth.utils import ceil_log2
 from .layout import PACKET_RAYS, token_layout, with_token
 from .queue import Queue
 
-__all__ = ["RayGeneration", "TILE_BITS", "packet_order"]
+__all__ = ["TILE_BITS", "RayGeneration", "packet_order"]
 
 #: A tile is a square of 2**TILE_BITS packets a side.
 TILE_BITS = 3

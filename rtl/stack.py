@@ -42,7 +42,7 @@ class TraversalStack(wiring.Component):
     resume : stream of ``{"token", "node"}``: an entry worth visiting, its rays as the token's mask
     exhausted : stream of tokens: that level of the stack is empty
     hit_address, hit_distances : the thread whose hit distances are wanted; two cycles later, per ray
-    popped_address, popped_intervals : thread and level; two cycles later, the intervals that it popped last
+    popped_address, popped_intervals : a thread; two cycles later, the intervals that it popped last
     """
 
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None):
@@ -62,7 +62,7 @@ class TraversalStack(wiring.Component):
             "exhausted": Out(stream.Signature(self._token, always_ready=True)),
             "hit_address": Out(range(num_threads)),
             "hit_distances": In(data.ArrayLayout(fmt, PACKET_RAYS)),
-            "popped_address": In(data.StructLayout({"level": 1, "thread": range(num_threads)})),
+            "popped_address": In(range(num_threads)),
             "popped_intervals": Out(self._intervals),
         })
 
@@ -139,16 +139,15 @@ class TraversalStack(wiring.Component):
             self.resume.payload.token.eq(done),
             self.resume.payload.token.mask.eq(worth),
             self.resume.payload.token.interval.eq(IntervalSource.POP),
-            self.resume.payload.token.interval_level.eq(done.level),
             self.resume.payload.node.eq(done_entry.node),
             self.resume.valid.eq(valid[stages] & keep),
         ]
 
-        m.submodules.popped = popped = memory.Memory(shape=self._intervals, depth=2 << thread_bits, init=[])
+        m.submodules.popped = popped = memory.Memory(shape=self._intervals, depth=1 << thread_bits, init=[])
         popped_write, popped_read = popped.write_port(), popped.read_port()
         popped_intervals = Signal(self._intervals, reset_less=True)
         m.d.comb += [
-            popped_write.addr.eq(Cat(done.level, done.thread)),
+            popped_write.addr.eq(done.thread),
             popped_write.data.eq(done_entry.intervals),
             popped_write.en.eq(self.resume.valid),
             popped_read.addr.eq(self.popped_address),

@@ -6,8 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from fpu import Datapath, Delay, IntToFloat
 
-from .layout import (PACKET_RAYS, IntervalSource, camera_layout, matrix_layout, token_layout, vector_layout,
-                     with_token)
+from .layout import PACKET_RAYS, IntervalSource, camera_layout, matrix_layout, token_layout, vector_layout, with_token
 from .ray_store import RayStore, ray_store_ports
 
 __all__ = ["Transformation", "affine_map"]
@@ -35,7 +34,7 @@ def affine_map(fmt, *, latencies=None):
     rows = [dp.vector(f"row{row}") for row in range(3)]
     x, y, z = (dp.sub(getattr(vector, axis), dp.select(is_point, getattr(center, axis), dp.const(0.0)))
                for axis in "xyz")
-    for row, name in zip(rows, "xyz"):
+    for row, name in zip(rows, "xyz", strict=True):
         dp.output(f"result_{name}", dp.add(dp.add(dp.mul(row.x, x), dp.mul(row.y, y)), dp.mul(row.z, z)))
     return dp
 
@@ -232,6 +231,7 @@ class Transformation(wiring.Component):
             start[0].token.sp.eq(0),
             start[0].node.eq(step.job.index),
             start[0].token.level.eq(1),
+            start[0].token.interval.eq(IntervalSource.FRESH),
             starting[0].eq(stored & step.last),
             self.start.payload.eq(start[stages]),
             self.start.valid.eq(starting[stages]),
@@ -240,8 +240,6 @@ class Transformation(wiring.Component):
             m.d.comb += [
                 start[0].token.level.eq(0),
                 start[0].token.hit.eq(0),
-                start[0].token.interval.eq(IntervalSource.FRESH),
-                start[0].token.interval_level.eq(0),
                 start[0].node.eq(self.root),
             ]
         for stage in range(stages):

@@ -1,6 +1,6 @@
 """Traversal: one kd-tree step for four rays a clock."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import ceil_log2
@@ -8,7 +8,6 @@ from amaranth.utils import ceil_log2
 from fpu import Datapath, Delay
 
 from .layout import PACKET_RAYS, Axis, IntervalSource, interval_layout, node_layout, token_layout, with_token
-from .queue import Queue
 from .ray_store import RayStore, ray_store_ports
 
 __all__ = ["Traversal", "kd_step"]
@@ -97,7 +96,7 @@ class Traversal(wiring.Component):
                                            "intervals": self._intervals})),
             "step_address": Out(store["step_address"]),
             "step_rays": In(store["step_rays"]),
-            "popped_address": Out(data.StructLayout({"level": 1, "thread": range(num_threads)})),
+            "popped_address": Out(range(num_threads)),
             "popped_intervals": In(self._intervals),
             "busy": Out(1),
         })
@@ -147,15 +146,14 @@ class Traversal(wiring.Component):
 
         # The interval, from where the token says it is.
         thread_bits = ceil_log2(self._num_threads)
-        m.submodules.intervals = intervals = memory.Memory(shape=self._intervals, depth=2 << thread_bits, init=[])
+        m.submodules.intervals = intervals = memory.Memory(shape=self._intervals, depth=1 << thread_bits, init=[])
         write, read = intervals.write_port(), intervals.read_port()
         fetch = to_fetch.o.token
         stepped = Signal(self._intervals, reset_less=True)
         m.submodules.source = source = Delay(IntervalSource, cycles=read_latency)
         m.d.comb += [
-            read.addr.eq(Cat(fetch.interval_level, fetch.thread)),
-            self.popped_address.level.eq(fetch.interval_level),
-            self.popped_address.thread.eq(fetch.thread),
+            read.addr.eq(fetch.thread),
+            self.popped_address.eq(fetch.thread),
             source.i.eq(fetch.interval),
         ]
         m.d.sync += stepped.eq(read.data)
@@ -225,8 +223,7 @@ class Traversal(wiring.Component):
             self.child.payload.token.mask.eq(Mux(choice.upper, chosen.goes_upper, chosen.goes_lower)),
             self.child.payload.token.sp.eq(here.sp + choice.both),
             self.child.payload.token.interval.eq(IntervalSource.STEP),
-            self.child.payload.token.interval_level.eq(here.level),
-            write.addr.eq(Cat(here.level, here.thread)),
+            write.addr.eq(here.thread),
             write.data.eq(Mux(choice.upper, chosen.upper, chosen.lower)),
             write.en.eq(self.child.valid),
             self.push.valid.eq(decided & choice.both),

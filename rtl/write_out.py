@@ -11,7 +11,7 @@ from .intersection import hit_layout
 from .layout import PACKET_RAYS, token_layout
 from .queue import Queue
 
-__all__ = ["WriteOut", "pixel_layout", "INTENSITY_BITS"]
+__all__ = ["INTENSITY_BITS", "WriteOut", "pixel_layout"]
 
 #: Fraction bits of the light on a surface: 256 stands for |D′z| ≥ 1.
 INTENSITY_BITS = 8

@@ -7,7 +7,8 @@ from ctypes import POINTER, c_int32, c_uint32, c_uint64
 
 import numpy as np
 
-from rtl.dynrtc import COUNTERS, UNITS
+from rtl.dynrtc import COUNTERS, UNITS, line_words
+from rtl.write_out import pixel_layout
 
 from .build import chip_library
 
@@ -36,8 +37,8 @@ class Bench:
 
     Parameters
     ----------
-    dut : DynRTC
-        The chip's description; tells widths and layouts.
+    config : ChipConfig
+        The chip.
     latency : int
         Cycles from a request to the first word of a line.
     jitter : int
@@ -56,9 +57,9 @@ class Bench:
         If the chip cannot be compiled.
     """
 
-    def __init__(self, dut, *, latency=4, jitter=0, seed=1, trace="", progress=lambda text: None):
-        self._dut = dut
-        self._library = library = ctypes.CDLL(str(chip_library(dut.config, trace=trace, progress=progress)))
+    def __init__(self, config, *, latency=4, jitter=0, seed=1, trace="", progress=lambda text: None):
+        self._config = config
+        self._library = library = ctypes.CDLL(str(chip_library(config, trace=trace, progress=progress)))
         library.bench_new.restype = ctypes.c_void_p
         for name in ("cycle", "words_read"):
             getattr(library, f"bench_{name}").restype = c_uint64
@@ -81,13 +82,13 @@ class Bench:
 
     def load(self, name, words):
         """Puts ``words`` (uint32) into one of :data:`MEMORIES`."""
-        line_words = self._dut.line_words[name]
+        words_at_once = line_words(self._config)[name]
         # A line may reach past the last item.
-        padded = np.zeros(-(-max(words.size, 1) // line_words) * line_words, np.uint32)
+        padded = np.zeros(-(-max(words.size, 1) // words_at_once) * words_at_once, np.uint32)
         padded[:words.size] = words.reshape(-1)
         self._memories[name] = padded
         self._library.bench_memory(self._bench, MEMORIES.index(name), _array(padded, c_uint32),
-                                   c_uint64(padded.size), c_uint32(line_words))
+                                   c_uint64(padded.size), c_uint32(words_at_once))
 
     def trace(self, path, *, first=0, last=1 << 62):
         """Writes a waveform of the cycles from ``first`` to before ``last``, counted from now."""
@@ -114,8 +115,9 @@ class Bench:
         KeyboardInterrupt
             If the user interrupts.
         """
-        library, config = self._library, self._dut.config
-        words = -(-self._dut.signature.members["pixel"].signature.members["payload"].shape.size // 32)
+        library, config = self._library, self._config
+        layout = pixel_layout(fmt=config.fmt, index_width=config.index_width, coord_width=config.coord_width)
+        words = -(-layout.size // 32)
         pixels = np.zeros((height, width, words), np.uint32)
         written = np.zeros((height, width), np.uint64)
         begun = np.zeros(-(-width // 2) * -(-height // 2), np.uint64)

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from rtl.dynrtc import CACHES, DynRTC
+from rtl.dynrtc import CACHES
 from rtl.ray_generation import packet_order
 from rtl.write_out import pixel_layout
 
@@ -102,11 +102,10 @@ def render_rtl(image, camera, width, height, *, config, background=(0, 0, 0), la
     BuildError, SimulationError
         See :mod:`~sim.machine.build` and :mod:`~sim.machine.bench`.
     """
-    dut = DynRTC(config)
     trace = "" if wave is None else str(wave).rsplit(".", 1)[-1].lower()
 
     def draw(trace, path=None, window=None):
-        with Bench(dut, latency=latency, jitter=jitter, seed=seed, trace=trace, progress=progress) as bench:
+        with Bench(config, latency=latency, jitter=jitter, seed=seed, trace=trace, progress=progress) as bench:
             for name in ("nodes", "lists", "matrices", "shading"):
                 bench.load(name, getattr(image, name))
             if path is not None:

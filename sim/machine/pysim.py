@@ -7,7 +7,7 @@ import numpy as np
 from amaranth.hdl import Signal
 from amaranth.sim import Simulator
 
-from rtl.dynrtc import COUNTERS, DynRTC
+from rtl.dynrtc import COUNTERS, DynRTC, line_words
 
 from .bench import MEMORIES, HangError
 from .machine import camera_words, decode_pixels, report_of
@@ -54,10 +54,10 @@ def render_pysim(image, camera, width, height, *, config, background=(0, 0, 0), 
         If no pixel comes for ``hang_cycles``.
     """
     dut = DynRTC(config)
-    memories = {}
+    memories, words_of = {}, line_words(config)
     for name in MEMORIES:
-        words, line_words = getattr(image, name).reshape(-1), dut.line_words[name]
-        memories[name] = _Memory(np.pad(words, (0, -len(words) % line_words)), line_words, latency)
+        words = getattr(image, name).reshape(-1)
+        memories[name] = _Memory(np.pad(words, (0, -len(words) % words_of[name])), words_of[name], latency)
     payload_width = Signal(dut.pixel.payload.shape()).shape().size
     pixels = np.zeros((height, width, -(-payload_width // 32)), np.uint32)
     counters = {}

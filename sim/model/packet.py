@@ -72,8 +72,9 @@ def trace_packet(params, root, nodes, splits, lists, matrices, mailbox_entries, 
     position = np.zeros(2, np.int64)
     is_last = np.zeros(2, np.bool_)
     leaf_mask = np.zeros(2, np.int64)
-    letters = np.full((max(mailbox_entries, 1), 2), 0, np.int64)
-    next_letter = 0
+    letter_index = np.zeros((2, max(mailbox_entries, 1)), np.int64)
+    letter_rays = np.zeros((2, max(mailbox_entries, 1)), np.int64)
+    next_letter = np.zeros(2, np.int64)
     child_interval = np.empty((2, 4, 2))
 
     origin[0] = camera[3]
@@ -160,34 +161,34 @@ def trace_packet(params, root, nodes, splits, lists, matrices, mailbox_entries, 
             is_last[level] = word & LAST_ENTRY != 0
             index = word & INDEX_MASK
             matrix = matrices[index]
-            if word & INSTANCE_ENTRY:
+            wanted = leaf_mask[level]
+            if mailbox_entries:
+                place = -1
+                for number in range(mailbox_entries):
+                    if letter_index[level, number] == index and letter_rays[level, number]:
+                        place = number
+                if place < 0:
+                    place = next_letter[level]
+                    next_letter[level] = (place + 1) % mailbox_entries
+                    letter_index[level, place] = index
+                    letter_rays[level, place] = 0
+                tested = letter_rays[level, place]
+                letter_rays[level, place] = tested | wanted
+                wanted &= ~tested
+            if wanted and word & INSTANCE_ENTRY:
                 counts[_INSTANCES] += 1
                 counts[_VECTORS] += 1
-                mask = leaf_mask[0]
-                letters[:, 1] = 0
-                next_letter = 0
+                mask = wanted
+                letter_rays[1] = 0
+                next_letter[1] = 0
                 origin[1] = _transform(params, matrix, origin[0], True)
                 for ray in range(4):
                     if mask >> ray & 1:
                         counts[_VECTORS] += 1
                         direction[1, ray] = _transform(params, matrix, direction[0, ray], False)
-                        interval[1, ray] = interval[0, ray]
+                        interval[1, ray, 0], interval[1, ray, 1] = 0.0, np.inf
                 level, sp[1], instance, node, action = 1, 0, index, index, _VISIT
                 continue
-            wanted = leaf_mask[level]
-            if mailbox_entries:
-                place = -1
-                for number in range(mailbox_entries):
-                    if letters[number, 0] == index and letters[number, 1]:
-                        place = number
-                if place < 0:
-                    place = next_letter
-                    next_letter = (next_letter + 1) % mailbox_entries
-                    letters[place, 0] = index
-                    letters[place, 1] = 0
-                tested = letters[place, 1]
-                letters[place, 1] = tested | wanted
-                wanted &= ~tested
             if wanted:
                 counts[_VECTORS] += 1
                 ox, oy, oz = _transform(params, matrix, origin[level], True)
