@@ -1,6 +1,6 @@
 """The rays of all threads, kept twice: by axis for traversal, by vector for transformation."""
 
-from amaranth.hdl import Cat, Module, Signal
+from amaranth.hdl import Assert, Cat, Module, Signal
 from amaranth.lib import data, memory, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import ceil_log2
@@ -27,8 +27,8 @@ class RayStore(wiring.Component):
 
     A kd-step needs one coordinate of four rays, the transformation three coordinates of one ray. Each gets a
     memory of its own; both are written together. The one for kd-steps takes a vector in three cycles, an axis
-    a cycle, in a bank for each ray's origin and for each ray's direction: writers must leave three cycles
-    between vectors for the same bank, which a packet's vectors, written in turn, do by themselves.
+    a cycle, in a bank for each ray's origin and for each ray's direction: writers must leave three cycles from
+    one vector to the next for the same bank. That they do is asserted in simulation.
 
     A packet has one origin for all its rays.
 
@@ -93,6 +93,7 @@ class RayStore(wiring.Component):
                 m.d.sync += axis.eq(Axis.Z)
             with m.Case(Axis.Z):
                 m.d.sync += axis.eq(Axis.LEAF)
+        m.d.sync += Assert(~select | (axis == Axis.LEAF) | (axis == Axis.Z), "a vector comes before the last one is in")
         with m.If(select):
             m.d.sync += [
                 axis.eq(Axis.X),

@@ -107,6 +107,7 @@ class Transformation(wiring.Component):
         ray = Signal(range(PACKET_RAYS))
         others = Signal(PACKET_RAYS)
         last = Signal()
+        stores, next_stores = Signal(), Signal()
         take = Signal()
         for number in reversed(range(PACKET_RAYS)):
             with m.If(remaining[number]):
@@ -115,7 +116,11 @@ class Transformation(wiring.Component):
             # Without its lowest set bit; a mask is never empty, so an origin is never the last vector.
             others.eq(remaining & (remaining - 1)),
             last.eq(~origin_next & ~others.any()),
-            take.eq(~active | last),
+            # Between the vectors of two packets for the ray store goes a pause: it takes three cycles for one of
+            # the same origin or ray.
+            stores.eq(current.kind != Kind.TRIANGLE),
+            next_stores.eq(self.primary.valid | self.matrix.payload.payload.instance),
+            take.eq(~active | last & ~(stores & next_stores)),
             self.busy.eq(active),
             self.primary.ready.eq(take),
             self.matrix.ready.eq(take & ~self.primary.valid),
@@ -143,6 +148,8 @@ class Transformation(wiring.Component):
                 ]
         with m.Elif(origin_next):
             m.d.sync += origin_next.eq(0)
+        with m.Elif(last):
+            m.d.sync += active.eq(0)
         with m.Else():
             m.d.sync += remaining.eq(others)
 

@@ -69,7 +69,9 @@ def feed(port, queue, *, rng, gap=0.0):
             if queue and rng.random() >= gap:
                 ctx.set(payload, packed.pack(queue.popleft()))
                 ctx.set(port.valid, 1)
-                await ctx.tick().until(port.ready)
+                ready = False
+                while not ready:
+                    _, _, ready = await ctx.tick().sample(port.ready)
                 ctx.set(port.valid, 0)
             else:
                 await ctx.tick()
