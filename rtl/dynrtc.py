@@ -9,7 +9,7 @@ from .cache import WORD_WIDTH, Cache
 from .config import ChipConfig
 from .counters import Counters
 from .intersection import Intersection
-from .layout import NODE_BITS, camera_layout, matrix_layout, token_layout, with_token
+from .layout import NODE_BITS, camera_layout, matrix_layout, thread_width, token_layout, with_token
 from .mailboxed_list import MailboxedList
 from .queue import Merge, Queue
 from .ray_generation import RayGeneration
@@ -93,7 +93,7 @@ class DynRTC(wiring.Component):
             "pixel": Out(stream.Signature(pixel_layout(fmt=fmt, index_width=config.index_width,
                                                        coord_width=config.coord_width))),
             "counters": Out(data.StructLayout({name: 32 for name in COUNTERS})),
-            "probe": Out(data.ArrayLayout(data.StructLayout({"valid": 1, "thread": range(config.num_threads)}),
+            "probe": Out(data.ArrayLayout(data.StructLayout({"valid": 1, "thread": thread_width(config.num_threads)}),
                                           len(UNITS))),
         })
 

@@ -3,11 +3,10 @@
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
-from amaranth.utils import ceil_log2
 
 from fpu import Datapath, Delay
 
-from .layout import PACKET_RAYS, token_layout, vector_layout, with_token
+from .layout import PACKET_RAYS, thread_width, token_layout, vector_layout, with_token
 
 __all__ = ["Intersection", "hit_layout", "unit_triangle"]
 
@@ -80,18 +79,18 @@ class Intersection(wiring.Component):
             "vector": In(stream.Signature(with_token(
                 token, index=index_width, is_origin=1, ray=range(PACKET_RAYS), last=1,
                 vector=vector_layout(fmt)), always_ready=True)),
-            "entered": In(data.StructLayout({"valid": 1, "thread": range(num_threads), "index": index_width})),
+            "entered": In(data.StructLayout({"valid": 1, "thread": thread_width(num_threads), "index": index_width})),
             "tested": Out(stream.Signature(token, always_ready=True)),
-            "hit_address": In(range(num_threads)),
+            "hit_address": In(thread_width(num_threads)),
             "hit_distances": Out(data.ArrayLayout(fmt, PACKET_RAYS)),
-            "record_address": In(data.StructLayout({"ray": range(PACKET_RAYS), "thread": range(num_threads)})),
+            "record_address": In(data.StructLayout({"ray": range(PACKET_RAYS), "thread": thread_width(num_threads)})),
             "record": Out(self._record),
             "busy": Out(1),
         })
 
     def elaborate(self, platform):
         m = Module()
-        num_slots = 1 << ceil_log2(self._num_threads)
+        num_slots = 1 << thread_width(self._num_threads)
         graph = unit_triangle(self._fmt, latencies=self._latencies)
         m.submodules.test = test = graph.component()
 

@@ -1,6 +1,7 @@
 """The shapes that units hand to each other and keep in memory."""
 
 from amaranth.lib import data, enum
+from amaranth.utils import ceil_log2
 
 __all__ = [
     "NODE_BITS",
@@ -11,7 +12,7 @@ __all__ = [
     "interval_layout",
     "list_entry_layout",
     "matrix_layout",
-    "node_layout",
+    "node_layout", "thread_width",
     "token_layout",
     "vector_layout",
     "with_token",
@@ -41,6 +42,11 @@ class IntervalSource(enum.Enum, shape=2):
     POP = 2     #: in the memory that the stack writes when it pops
 
 
+def thread_width(num_threads):
+    """Bits of a thread's number; one even for a single thread, for tools that know no memory of a single word."""
+    return max(ceil_log2(num_threads), 1)
+
+
 def token_layout(*, num_threads, stack_depth):
     """A thread's ticket: whoever holds it works for that thread, and nobody else does.
 
@@ -57,7 +63,7 @@ def token_layout(*, num_threads, stack_depth):
     interval : where [t_near, t_far] of the rays is kept
     """
     return data.StructLayout({
-        "thread": range(num_threads),
+        "thread": thread_width(num_threads),
         "level": 1,
         "hit": PACKET_RAYS,
         "mask": PACKET_RAYS,

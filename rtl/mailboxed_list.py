@@ -3,9 +3,8 @@
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
-from amaranth.utils import ceil_log2
 
-from .layout import PACKET_RAYS, list_entry_layout, token_layout, with_token
+from .layout import PACKET_RAYS, list_entry_layout, thread_width, token_layout, with_token
 from .queue import Merge, Queue
 
 __all__ = ["MailboxedList"]
@@ -48,7 +47,7 @@ class MailboxedList(wiring.Component):
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         self._place = with_token(token, list=index_width)
         super().__init__({
-            "begin": In(data.StructLayout({"valid": 1, "thread": range(num_threads)})),
+            "begin": In(data.StructLayout({"valid": 1, "thread": thread_width(num_threads)})),
             "leaf": In(stream.Signature(self._place)),
             "tested": In(stream.Signature(token)),
             "left": In(stream.Signature(token)),
@@ -65,7 +64,7 @@ class MailboxedList(wiring.Component):
         count = self._mailbox_entries
         box_layout = data.StructLayout({"letters": data.ArrayLayout(letter_layout, count), "next": range(count)})
         m.submodules[f"mailboxes{level}"] = mailboxes = memory.Memory(
-            shape=box_layout, depth=1 << ceil_log2(self._num_threads), init=[])
+            shape=box_layout, depth=1 << thread_width(self._num_threads), init=[])
         read, write = mailboxes.read_port(domain="comb"), mailboxes.write_port()
         found = Signal(count, name=f"found{level}")
         tested = Signal(PACKET_RAYS, name=f"tested{level}")
@@ -99,7 +98,7 @@ class MailboxedList(wiring.Component):
         m = Module()
         context_layout = with_token(self._token, list=self._index_width, last=1)
         m.submodules.contexts = contexts = memory.Memory(
-            shape=context_layout, depth=2 << ceil_log2(self._num_threads), init=[])
+            shape=context_layout, depth=2 << thread_width(self._num_threads), init=[])
 
         # Tokens that come back find in memory where in which list they were.
         m.submodules.back = back = Merge(self._token, num_inputs=2)

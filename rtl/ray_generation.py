@@ -3,9 +3,8 @@
 from amaranth.hdl import Cat, Module, Mux, Signal, signed
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
-from amaranth.utils import ceil_log2
 
-from .layout import PACKET_RAYS, token_layout, with_token
+from .layout import PACKET_RAYS, thread_width, token_layout, with_token
 from .queue import Queue
 
 __all__ = ["TILE_BITS", "RayGeneration", "packet_order"]
@@ -60,24 +59,24 @@ class RayGeneration(wiring.Component):
             "start": In(1),
             "ready": Out(1),
             "primary": Out(stream.Signature(with_token(token, x=half, y=half))),
-            "begin": Out(data.StructLayout({"valid": 1, "thread": range(num_threads)})),
+            "begin": Out(data.StructLayout({"valid": 1, "thread": thread_width(num_threads)})),
             "finished": In(stream.Signature(token, always_ready=True)),
-            "position_address": In(range(num_threads)),
+            "position_address": In(thread_width(num_threads)),
             "position": Out(self._position),
         })
 
     def elaborate(self, platform):
         m = Module()
         threads = self._num_threads
-        m.submodules.free = free = Queue(range(threads), depth=threads, always_ready=True)
+        m.submodules.free = free = Queue(thread_width(threads), depth=threads, always_ready=True)
         m.submodules.positions = positions = memory.Memory(
-            shape=self._position, depth=1 << ceil_log2(threads), init=[])
+            shape=self._position, depth=1 << thread_width(threads), init=[])
         write, read = positions.write_port(), positions.read_port(domain="comb")
 
         # At first every thread is free without having finished anything.
         unused = Signal(range(threads + 1), init=threads)
         at_work = Signal(range(threads + 1))
-        thread = Signal(range(threads))
+        thread = Signal(thread_width(threads))
         available = Signal()
         m.d.comb += [
             free.i.payload.eq(self.finished.payload.thread),

@@ -3,19 +3,18 @@
 from amaranth.hdl import Assert, Cat, Module, Signal
 from amaranth.lib import data, memory, wiring
 from amaranth.lib.wiring import In, Out
-from amaranth.utils import ceil_log2
 
-from .layout import PACKET_RAYS, Axis, vector_layout
+from .layout import PACKET_RAYS, Axis, thread_width, vector_layout
 
 __all__ = ["RayStore", "ray_store_ports"]
 
 
 def ray_store_ports(*, fmt, num_threads):
     """Shapes of the members of a :class:`RayStore`."""
-    vector = {"thread": range(num_threads), "level": 1, "is_origin": 1, "ray": range(PACKET_RAYS)}
+    vector = {"thread": thread_width(num_threads), "level": 1, "is_origin": 1, "ray": range(PACKET_RAYS)}
     return {
         "write": data.StructLayout({"valid": 1, **vector, "vector": vector_layout(fmt)}),
-        "step_address": data.StructLayout({"thread": range(num_threads), "level": 1, "axis": Axis}),
+        "step_address": data.StructLayout({"thread": thread_width(num_threads), "level": 1, "axis": Axis}),
         "step_rays": data.ArrayLayout(data.StructLayout({"origin": fmt, "direction": fmt}), PACKET_RAYS),
         "vector_address": data.StructLayout(vector),
         "vector": vector_layout(fmt),
@@ -66,7 +65,7 @@ class RayStore(wiring.Component):
 
     def _bank(self, m, name, *, select, field):
         """One coordinate memory; takes a vector when ``select`` is set."""
-        thread_bits = ceil_log2(self._num_threads)
+        thread_bits = thread_width(self._num_threads)
         m.submodules[name] = bank = memory.Memory(shape=self._fmt, depth=1 << thread_bits + 3, init=[])
         write, read = bank.write_port(), bank.read_port()
         axis = Signal(Axis, name=f"{name}_axis", init=Axis.LEAF)

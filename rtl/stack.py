@@ -7,7 +7,7 @@ from amaranth.utils import ceil_log2
 
 from fpu import Datapath
 
-from .layout import PACKET_RAYS, IntervalSource, interval_layout, token_layout, with_token
+from .layout import PACKET_RAYS, IntervalSource, interval_layout, thread_width, token_layout, with_token
 from .queue import Merge, Queue
 
 __all__ = ["TraversalStack", "worth_visiting"]
@@ -60,15 +60,15 @@ class TraversalStack(wiring.Component):
             "pop": In(stream.Signature(self._token)),
             "resume": Out(stream.Signature(self._node, always_ready=True)),
             "exhausted": Out(stream.Signature(self._token, always_ready=True)),
-            "hit_address": Out(range(num_threads)),
+            "hit_address": Out(thread_width(num_threads)),
             "hit_distances": In(data.ArrayLayout(fmt, PACKET_RAYS)),
-            "popped_address": In(range(num_threads)),
+            "popped_address": In(thread_width(num_threads)),
             "popped_intervals": Out(self._intervals),
         })
 
     def elaborate(self, platform):
         m = Module()
-        thread_bits = ceil_log2(self._num_threads)
+        thread_bits = thread_width(self._num_threads)
         entry_bits = ceil_log2(self._stack_depth)
         entry_layout = data.StructLayout({"node": self._index_width, "mask": PACKET_RAYS,
                                           "intervals": self._intervals})

@@ -6,7 +6,16 @@ from amaranth.lib.wiring import In, Out
 
 from fpu import Datapath, Delay, IntToFloat
 
-from .layout import PACKET_RAYS, IntervalSource, camera_layout, matrix_layout, token_layout, vector_layout, with_token
+from .layout import (
+    PACKET_RAYS,
+    IntervalSource,
+    camera_layout,
+    matrix_layout,
+    thread_width,
+    token_layout,
+    vector_layout,
+    with_token,
+)
 from .ray_store import RayStore, ray_store_ports
 
 __all__ = ["Transformation", "affine_map"]
@@ -90,7 +99,7 @@ class Transformation(wiring.Component):
             "vector": Out(stream.Signature(with_token(
                 token, index=index_width, is_origin=1, ray=range(PACKET_RAYS), last=1,
                 vector=vector_layout(fmt)), always_ready=True)),
-            "entered": Out(data.StructLayout({"valid": 1, "thread": range(num_threads), "index": index_width})),
+            "entered": Out(data.StructLayout({"valid": 1, "thread": thread_width(num_threads), "index": index_width})),
             "busy": Out(1),
         })
 

@@ -3,11 +3,19 @@
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
-from amaranth.utils import ceil_log2
 
 from fpu import Datapath, Delay
 
-from .layout import PACKET_RAYS, Axis, IntervalSource, interval_layout, node_layout, token_layout, with_token
+from .layout import (
+    PACKET_RAYS,
+    Axis,
+    IntervalSource,
+    interval_layout,
+    node_layout,
+    thread_width,
+    token_layout,
+    with_token,
+)
 from .ray_store import RayStore, ray_store_ports
 
 __all__ = ["Traversal", "kd_step"]
@@ -96,7 +104,7 @@ class Traversal(wiring.Component):
                                            "intervals": self._intervals})),
             "step_address": Out(store["step_address"]),
             "step_rays": In(store["step_rays"]),
-            "popped_address": Out(range(num_threads)),
+            "popped_address": Out(thread_width(num_threads)),
             "popped_intervals": In(self._intervals),
             "busy": Out(1),
         })
@@ -145,7 +153,7 @@ class Traversal(wiring.Component):
         m.d.sync += valid[1:].eq(valid[:-1])
 
         # The interval, from where the token says it is.
-        thread_bits = ceil_log2(self._num_threads)
+        thread_bits = thread_width(self._num_threads)
         m.submodules.intervals = intervals = memory.Memory(shape=self._intervals, depth=1 << thread_bits, init=[])
         write, read = intervals.write_port(), intervals.read_port()
         fetch = to_fetch.o.token

@@ -8,7 +8,7 @@ from fpu import Delay, FloatToInt
 
 from .cache import WORD_WIDTH
 from .intersection import hit_layout
-from .layout import PACKET_RAYS, token_layout
+from .layout import PACKET_RAYS, thread_width, token_layout
 from .queue import Queue
 
 __all__ = ["INTENSITY_BITS", "WriteOut", "pixel_layout"]
@@ -66,9 +66,9 @@ class WriteOut(wiring.Component):
             "background": In(24),
             "packet": In(stream.Signature(token)),
             "finished": Out(stream.Signature(token, always_ready=True)),
-            "position_address": Out(range(num_threads)),
+            "position_address": Out(thread_width(num_threads)),
             "position": In(position),
-            "record_address": Out(data.StructLayout({"ray": range(PACKET_RAYS), "thread": range(num_threads)})),
+            "record_address": Out(data.StructLayout({"ray": range(PACKET_RAYS), "thread": thread_width(num_threads)})),
             "record": In(self._record),
             "color_request": Out(stream.Signature(index_width)),
             "color_data": In(stream.Signature(WORD_WIDTH, always_ready=True)),

@@ -2,6 +2,7 @@
 
 import click
 
+from .first_light import first_light
 from .inspect import image
 from .render import render
 
@@ -14,5 +15,6 @@ def main():
     """DynRT: a real-time ray tracer in hardware, simulated."""
 
 
+main.add_command(first_light)
 main.add_command(render)
 main.add_command(image)

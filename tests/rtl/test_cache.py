@@ -79,7 +79,7 @@ def run_cache(*, seed, num_lines, line_items, item_width, num_fetches, gap, late
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("line_items,item_width", [(1, 32), (4, 32), (2, 64), (1, 288), (1, 24)])
+@pytest.mark.parametrize(("line_items", "item_width"), [(1, 32), (4, 32), (2, 64), (1, 288), (1, 24)])
 def test_every_request_is_answered_once_and_right(seed, line_items, item_width):
     # Near ones share lines; far ones, a multiple of the cache's size apart, evict each other.
     rng = random.Random(seed)

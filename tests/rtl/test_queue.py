@@ -31,7 +31,8 @@ def test_queue_keeps_order(seed, depth, gaps):
                 held.append(value)
 
     simulate(dut, until(lambda: len(received) == len(sent), quiet=depth + 2), name="queue", background=(
-        compare_level, feed(dut.i, deque(sent), rng=rng, gap=gaps[0]), drain(dut.o, received.append, rng=rng, gap=gaps[1])))
+        compare_level, feed(dut.i, deque(sent), rng=rng, gap=gaps[0]),
+        drain(dut.o, received.append, rng=rng, gap=gaps[1])))
     assert received == sent
 
 

@@ -134,7 +134,8 @@ def run(world, *, seed, gap=0.0, latencies=LATENCIES):
                  watch(dut.write, lambda write: results.append(("write", write))),
                  drain(dut.vector, lambda vector: results.append(("vector", vector))),
                  drain(dut.start, started.append),
-                 feed(dut.primary, world.primaries, rng=rng, gap=gap), feed(dut.matrix, world.matrices, rng=rng, gap=gap)))
+                 feed(dut.primary, world.primaries, rng=rng, gap=gap),
+                 feed(dut.matrix, world.matrices, rng=rng, gap=gap)))
     assert len(accepted) == num_jobs
     return accepted, list(zip(outputs, results, strict=True)), list(zip(starts, started, strict=True)), entered
 

@@ -172,7 +172,8 @@ def test_steps(seed):
     assert min(events["both"], events["none"], events["child"] - events["both"]) > 20
 
 
-@pytest.mark.parametrize("latencies", [{"add": 0, "div": 0, "cmp": 0, "select": 1}, {"add": 1, "div": 9, "cmp": 2}, None])
+@pytest.mark.parametrize("latencies", [
+    {"add": 0, "div": 0, "cmp": 0, "select": 1}, {"add": 1, "div": 9, "cmp": 2}, None])
 def test_latencies_of_operators(latencies):
     run(World(seed=7, num_threads=7, num_steps=120), num_threads=7, gap=0.1, latencies=latencies)
 
@@ -197,5 +198,6 @@ def test_leaves_pass():
 
     simulate(dut, until(lambda: len(leaves) == len(sent), quiet=30), name="traversal", background=(
         feed(dut.node, nodes, rng=rng, gap=0.3),
-        drain(dut.leaf, lambda leaf: leaves.append((fields(leaf.token), leaf.list))), drain(dut.child, nothing), drain(dut.pop, nothing), watch(dut.push, nothing)))
+        drain(dut.leaf, lambda leaf: leaves.append((fields(leaf.token), leaf.list))),
+        drain(dut.child, nothing), drain(dut.pop, nothing), watch(dut.push, nothing)))
     assert leaves == sent

