@@ -11,18 +11,19 @@ from rtl.cache import Cache
 from rtl.queue import Queue
 from tests.formal.prove import Refuted, prove
 
-INDEX_WIDTH, NUM_WAITING = 3, 3
+INDEX_WIDTH = 3
 
 
-def cache_proof(*, line_items, num_fetches, patience=None, broken=False):
+def cache_proof(*, line_items=1, num_fetches=1, num_waiting=3, patience=None, broken=False):
     """A cache whose requests carry their own index, and one of them a mark.
 
     With ``patience``, memory and receiver never let it wait, and so many cycles must do for the marked request.
     """
     m = Module()
     payload = data.StructLayout({"index": INDEX_WIDTH, "marked": 1})
-    m.submodules.cache = dut = Cache(item_width=INDEX_WIDTH, payload_shape=payload, index_width=INDEX_WIDTH, num_lines=2,
-                                     line_items=line_items, num_fetches=num_fetches, num_waiting=NUM_WAITING)
+    m.submodules.cache = dut = Cache(
+        item_width=INDEX_WIDTH, payload_shape=payload, index_width=INDEX_WIDTH, num_lines=2, line_items=line_items,
+        num_fetches=num_fetches, num_waiting=num_waiting)
     line_width = len(dut.line_request.payload)
     m.submodules.lines = lines = Queue(line_width, depth=num_fetches)
     index, mark, wants, takes, accepts, delivers = (
@@ -30,12 +31,12 @@ def cache_proof(*, line_items, num_fetches, patience=None, broken=False):
     ports = [index, mark, wants, takes, accepts, delivers]
 
     # Requests; no more of them in the cache than it was promised.
-    held = Signal(range(NUM_WAITING + 1))
+    held = Signal(range(num_waiting + 1))
     asked, answered = Signal(), Signal()
     marked, inside = Signal(), Signal()
     request, response = dut.request, dut.response
     m.d.comb += [
-        request.valid.eq(wants & (held < NUM_WAITING)),
+        request.valid.eq(wants & (held < num_waiting)),
         request.payload.index.eq(index),
         request.payload.payload.index.eq(index),
         request.payload.payload.marked.eq(mark & ~marked),
