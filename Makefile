@@ -25,7 +25,7 @@ render: setup
 	$(BIN)/dynrt render room --output build/render/room.png --report build/render/room.json
 
 test: setup
-	$(BIN)/pytest --numprocesses auto --dist worksteal
+	$(BIN)/pytest --numprocesses auto --dist loadgroup
 
 lint: setup
 	$(BIN)/ruff check

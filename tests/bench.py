@@ -65,16 +65,16 @@ def feed(port, queue, *, rng, gap=0.0):
     packed, payload = Packed(port.payload.shape()), Value.cast(port.payload)
 
     async def testbench(ctx):
-        while True:
-            if queue and rng.random() >= gap:
+        offers = False
+        async for _, _, ready in ctx.tick().sample(port.ready):
+            if offers and not ready:
+                continue
+            starts = bool(queue) and rng.random() >= gap
+            if starts:
                 ctx.set(payload, packed.pack(queue.popleft()))
-                ctx.set(port.valid, 1)
-                ready = False
-                while not ready:
-                    _, _, ready = await ctx.tick().sample(port.ready)
-                ctx.set(port.valid, 0)
-            else:
-                await ctx.tick()
+            if starts != offers:
+                ctx.set(port.valid, starts)
+            offers = starts
     return testbench
 
 
@@ -83,12 +83,14 @@ def drain(port, take, *, rng=None, gap=0.0):
     packed, sampled = Packed(port.payload.shape()), (port.valid, port.ready, Value.cast(port.payload))
 
     async def testbench(ctx):
-        while True:
-            if not port.signature.always_ready:
-                ctx.set(port.ready, not gap or rng.random() >= gap)
-            _, _, valid, ready, payload = await ctx.tick().sample(*sampled)
+        accepts = port.signature.always_ready
+        async for _, _, valid, ready, bits in ctx.tick().sample(*sampled):
             if valid and ready:
-                take(packed.unpack(payload))
+                take(packed.unpack(bits))
+            if not port.signature.always_ready:
+                before, accepts = accepts, not gap or rng.random() >= gap
+                if accepts != before:
+                    ctx.set(port.ready, accepts)
     return testbench
 
 

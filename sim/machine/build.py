@@ -131,8 +131,8 @@ def _build(config, trace, work, progress):
     compiler = _compiler()
 
     def compile_source(source):
-        # What Verilator calls slow runs once, at the start.
-        optimise = "-O0" if "__Slow" in source.name else "-O2"
+        # What Verilator calls slow runs once, at the start; and writing waveforms takes longer than simulating.
+        optimise = "-O0" if "__Slow" in source.name else "-O1" if trace else "-O2"
         target = work / f"{source.stem}.o"
         _run([*compiler, *flags, optimise, "-c", str(source), "-o", str(target)], cwd=work, log=log)
         return str(target)

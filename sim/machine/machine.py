@@ -121,7 +121,7 @@ def render_rtl(image, camera, width, height, *, config, background=(0, 0, 0), la
 
     if pixels:
         # Where in time a pixel is at work is known only afterwards; the second run is the same as the first.
-        _, written, begun, *_ = draw("")
+        _, written, begun, *_ = draw(trace)
         cycles = wave_window(begun, written, pixels, width, height)
     raw, _, _, counters, bytes_read, rate = draw(trace, wave, cycles)
     frame = decode_pixels(raw, image, config)

@@ -79,18 +79,30 @@ def cache_proof(*, line_items=1, num_fetches=1, num_waiting=3, patience=None, br
     return m, ports
 
 
-@pytest.mark.parametrize(("line_items", "num_fetches", "cycles"), [(1, 1, 13), (1, 2, 13), (2, 2, 14)])
-def test_answers_are_right_and_not_doubled(tmp_path, line_items, num_fetches, cycles):
-    module, ports = cache_proof(line_items=line_items, num_fetches=num_fetches)
+@pytest.mark.parametrize(("parameters", "cycles"), [
+    (dict(), 13),
+    (dict(line_items=2), 13),
+    pytest.param(dict(), 16, marks=pytest.mark.slow),
+    pytest.param(dict(num_fetches=2), 16, marks=pytest.mark.slow),
+    pytest.param(dict(line_items=2, num_fetches=2), 16, marks=pytest.mark.slow),
+])
+def test_answers_are_right_and_not_doubled(tmp_path, parameters, cycles):
+    module, ports = cache_proof(**parameters)
     prove(module, ports=ports, cycles=cycles, by_induction=False, folder=tmp_path)
 
 
-def test_every_request_is_answered(tmp_path):
-    module, ports = cache_proof(line_items=1, num_fetches=1, patience=20)
-    prove(module, ports=ports, cycles=24, by_induction=False, folder=tmp_path)
+# The longest that a request waits: a cycle less is refuted.
+@pytest.mark.parametrize(("num_waiting", "patience", "cycles"), [
+    (1, 6, 13), pytest.param(2, 8, 18, marks=pytest.mark.slow)])
+def test_every_request_is_answered(tmp_path, num_waiting, patience, cycles):
+    module, ports = cache_proof(num_waiting=num_waiting, patience=patience)
+    prove(module, ports=ports, cycles=cycles, by_induction=False, folder=tmp_path)
+    module, ports = cache_proof(num_waiting=num_waiting, patience=patience - 1)
+    with pytest.raises(Refuted, match="model found"):
+        prove(module, ports=ports, cycles=cycles, by_induction=False, folder=tmp_path)
 
 
 def test_a_wrong_claim_is_refuted(tmp_path):
-    module, ports = cache_proof(line_items=1, num_fetches=1, broken=True)
+    module, ports = cache_proof(broken=True)
     with pytest.raises(Refuted, match="model found"):
         prove(module, ports=ports, cycles=10, by_induction=False, folder=tmp_path)

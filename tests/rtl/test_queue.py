@@ -43,7 +43,8 @@ def test_queue_overflow_is_noticed(depth):
 
         async def write(ctx):
             ctx.set(dut.i.valid, 1)
-            await ctx.tick().repeat(num_elements)
+            for _ in range(num_elements):
+                await ctx.tick()
             ctx.set(dut.i.valid, 0)
             await ctx.tick()
             assert ctx.get(dut.level) == num_elements

@@ -58,7 +58,8 @@ class Writer:
 
     def __iter__(self):
         packets = self.packets()
-        for self.now in range(self.cycles):
+        for now in range(self.cycles):
+            self.now = now
             yield next(packets)
 
 

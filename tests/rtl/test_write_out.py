@@ -98,18 +98,19 @@ def test_pixels(seed, num_threads, size, gap, latency):
             if requests and requests[0][0] <= now:
                 answers.append(requests.popleft()[1])
 
-    async def draw(ctx):
-        await give_packets(ctx)
-        while len(released) < num_packets or len(pixels) < len(expected):
-            assert not ctx.get(dut.idle) or len(pixels) == len(expected)
-            await ctx.tick()
-        await ctx.tick()
-        await ctx.tick()
+    async def check_idle(ctx):
+        async for _, _, idle in ctx.tick().sample(dut.idle):
+            if len(released) == num_packets:
+                assert not idle or len(pixels) == len(expected)
+
+    async def finish(ctx):
+        await until(lambda: len(pixels) == len(expected) and len(released) == num_packets, quiet=30)(ctx)
         assert ctx.get(dut.idle)
 
     asked = []
-    simulate(m, draw, until(lambda: len(pixels) == len(expected), quiet=30), name="write_out", background=(
+    simulate(m, give_packets, finish, name="write_out", background=(
         answer_requests, memory(dut.record_address, dut.record, lambda at: records.get((at.thread, at.ray), {})),
-        feed(dut.packet, packets, rng=rng, gap=gap), drain(dut.finished, release),
-        drain(dut.color_request, asked.append, rng=rng, gap=gap), feed(dut.color_data, answers, rng=rng),
-        drain(dut.pixel, receive, rng=rng, gap=gap)))
+        feed(dut.packet, packets, rng=rng, gap=gap), drain(dut.pixel, receive, rng=rng, gap=gap),
+        # What it looks at is as of the cycle before only because it comes between these two.
+        check_idle, drain(dut.finished, release),
+        drain(dut.color_request, asked.append, rng=rng, gap=gap), feed(dut.color_data, answers, rng=rng)))
