@@ -102,8 +102,8 @@ def test_missing_file(tmp_path):
 
 def test_unknown_format(tmp_path):
     fails(tmp_path, obj(tmp_path, "", "scene.stl"),
-          says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb and the built-in "
-               "scene 'room'")
+          says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb and the "
+               "built-in scene 'room'")
 
 
 def gltf(tmp_path, *, uri="data.bin", matrix=None, byte_length=36, data=None):
