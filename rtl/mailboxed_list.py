@@ -19,7 +19,7 @@ class MailboxedList(wiring.Component):
     the leaf, so once is enough. Each level has a mailbox; the one of the instances' triangles is emptied when
     an instance is entered, the one of the scene when the thread begins anew.
 
-    An entry takes one cycle; from an entry to the job for it pass 2.
+    An entry takes one cycle; the job for it follows in the next.
 
     Parameters
     ----------

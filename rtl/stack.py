@@ -24,7 +24,7 @@ class TraversalStack(wiring.Component):
     """Keeps the nodes that packets have put off, and pops those that a ray may still gain from.
 
     A popped entry is dropped when each of its rays has a hit before the entry's interval; then the next is
-    popped. One pop a clock, answered after 4 cycles plus the comparator's latency.
+    popped. One pop a clock, answered after 2 cycles plus the comparator's latency.
 
     Parameters
     ----------

@@ -213,3 +213,17 @@ def test_an_entry_a_cycle():
     simulate(dut, until(lambda: len(pops) == 19), ticks=24, name="mailboxed_list", background=(
         feed(dut.entry, entries, rng=rng), drain(dut.job, jobs.append), drain(dut.pop, pops.append)))
     assert [(job.index, job.token.mask) for job in jobs] == [(3, 0b0110)]
+
+
+def test_a_job_follows_its_entry_in_the_next_cycle():
+    dut = MailboxedList(num_threads=1, stack_depth=1, index_width=INDEX_WIDTH, mailbox_entries=1)
+
+    async def offer(ctx):
+        ctx.set(dut.entry.payload, {"item": 7, "payload": {"token": {"mask": 1}}})
+        ctx.set(dut.entry.valid, 1)
+        for is_there in (0, 1, 0):
+            assert ctx.get(dut.job.valid) == is_there
+            await ctx.tick()
+            ctx.set(dut.entry.valid, 0)
+
+    simulate(dut, offer, name="mailboxed_list")

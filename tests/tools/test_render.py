@@ -217,3 +217,31 @@ def test_image_prints_the_memories():
     assert re.search(r"^nodes: \d+$", result.output, re.MULTILINE)
     assert re.search(r"^ +0  [xyz] \S+ +children 2, 3", result.output, re.MULTILINE)
     assert re.search(r"^matrices: 806$", result.output, re.MULTILINE)
+
+
+def test_frames_of_a_moving_scene(tmp_path):
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
+    keys = np.array([0, 2], "<f4").tobytes() + np.array([[0, 0, 0], [4, 0, 0]], "<f4").tobytes()
+    (tmp_path / "data.bin").write_bytes(corners + keys)
+    scene = tmp_path / "moving.gltf"
+    scene.write_text(json.dumps({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": "mover"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [2]},
+            {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
+                        {"buffer": 0, "byteOffset": 44, "byteLength": 24}],
+        "buffers": [{"uri": "data.bin", "byteLength": 68}],
+        "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+                        "samplers": [{"input": 1, "output": 2, "interpolation": "LINEAR"}]}]}))
+    result = run("render", scene, "-o", tmp_path / "m.png", "--engine", "model", "--size", "40x30", "--frames", "2",
+                 "--camera", "2,0.5,6,2,0.5,0,0,1,0,60", "--report", tmp_path / "m.json")
+    assert result.exit_code == 0, result.output
+    reports = json.loads((tmp_path / "m.json").read_text())
+    assert [report["wrong_pixels_vs_golden"] for report in reports] == [0, 0]
+    # The triangle is at x = 0…1 first and at x = 2…3 after half of the two seconds; the camera looks at x = 2.
+    columns = [np.flatnonzero(np.asarray(Image.open(tmp_path / f"m-{number:04d}.png")).any(axis=(0, 2)))
+               for number in (0, 1)]
+    assert columns[0].max() < 20 <= columns[1].min() + 1
