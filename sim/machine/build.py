@@ -16,9 +16,10 @@ from amaranth.back.verilog import YosysError
 
 from rtl.dynrtc import UNITS, DynRTC
 
+from ..cache import cache_directory
 from .verilog import component_verilog
 
-__all__ = ["BuildError", "cache_directory", "chip_library"]
+__all__ = ["BuildError", "chip_library"]
 
 _PACKAGES = ("fpu", "rtl")
 _HERE = Path(__file__).parent
@@ -27,14 +28,6 @@ _TRACES = {"": 0, "vcd": 1, "fst": 2}
 
 class BuildError(Exception):
     """The chip could not be compiled for the simulator; the message tells what failed and where to look."""
-
-
-def cache_directory():
-    """Where compiled chips are kept: ``DYNRT_CACHE``, or a folder of the user's cache."""
-    base = os.environ.get("DYNRT_CACHE")
-    if base:
-        return Path(base)
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "dynrt"
 
 
 def _compiler():

@@ -8,6 +8,7 @@ from rtl.write_out import INTENSITY_BITS
 
 from ..frame import Frame
 from ..scene.image import SceneImage
+from .compiled import compiled
 from .packet import COUNTS, trace_packet
 
 __all__ = ["camera_rows", "render_model"]
@@ -24,7 +25,7 @@ def camera_rows(image, camera, width):
     return image.fmt.quantize(np.concatenate([columns, [(camera.eye - image.center) * image.scale]]))
 
 
-@numba.njit(error_model="numpy", parallel=True)
+@compiled(parallel=True)
 def _render(params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, camera, packets, x, y, width,
             height, hits, owners, counts, whole):
     for number in numba.prange(len(packets)):

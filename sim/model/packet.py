@@ -1,6 +1,5 @@
 """One packet's way through the chip."""
 
-import numba
 import numpy as np
 
 from fpu import FloatFormat
@@ -9,6 +8,7 @@ from rtl.transformation import affine_map
 from rtl.traversal import kd_step
 
 from ..scene.image import INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, UPPER_EMPTY
+from .compiled import compiled
 
 __all__ = ["COUNTS", "trace_packet"]
 
@@ -25,14 +25,14 @@ COUNTS = ("steps", "leaves", "entries", "transformed_vectors", "triangle_tests",
 _STEPS, _LEAVES, _ENTRIES, _VECTORS, _TESTS, _INSTANCES, _POPS, _DEPTH = range(8)
 
 
-@numba.njit(error_model="numpy")
+@compiled()
 def _transform(params, matrix, vector, is_point):
     return _affine_map(params, is_point, vector[0], vector[1], vector[2], matrix[3, 0], matrix[3, 1], matrix[3, 2],
                        matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[1, 0], matrix[1, 1], matrix[1, 2],
                        matrix[2, 0], matrix[2, 1], matrix[2, 2])
 
 
-@numba.njit(error_model="numpy")
+@compiled()
 def trace_packet(params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, camera, screen, mask,
                  hits, owners, counts):
     """Traces four rays; see :func:`~sim.model.model.render_model` for what the arrays hold.
