@@ -84,7 +84,7 @@ def cache_proof(*, line_items=1, num_fetches=1, num_waiting=3, patience=None, br
     (dict(line_items=2), 13),
     pytest.param(dict(), 15, marks=pytest.mark.slow),
     pytest.param(dict(num_fetches=2), 15, marks=pytest.mark.slow),
-    pytest.param(dict(line_items=2, num_fetches=2), 15, marks=pytest.mark.slow),
+    (dict(line_items=2, num_fetches=2), 14),
 ])
 def test_answers_are_right_and_not_doubled(tmp_path, parameters, cycles):
     module, ports = cache_proof(**parameters)
@@ -93,7 +93,7 @@ def test_answers_are_right_and_not_doubled(tmp_path, parameters, cycles):
 
 # The longest that a request waits: a cycle less is refuted.
 @pytest.mark.parametrize(("num_waiting", "patience", "cycles"), [
-    (1, 6, 13), pytest.param(2, 8, 15, marks=pytest.mark.slow)])
+    (1, 6, 13), (2, 8, 14)])
 def test_every_request_is_answered(tmp_path, num_waiting, patience, cycles):
     module, ports = cache_proof(num_waiting=num_waiting, patience=patience)
     prove(module, ports=ports, cycles=cycles, by_induction=False, folder=tmp_path)
