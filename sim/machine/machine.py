@@ -45,9 +45,7 @@ def decode_pixels(pixels, image, config):
     frame = Frame.empty(width, height)
     is_hit = _field(pixels, layout["is_hit"].offset, 1) == 1
     triangle, instance = value("triangle")[is_hit], np.where(value("in_instance"), value("instance"), -1)[is_hit]
-    known = image.triangle_instance[triangle]
-    frame.instance_id[is_hit] = np.where(known >= 0, known, np.append(image.instance_ids, -1)[instance])
-    frame.prim_id[is_hit] = image.triangle_prim[triangle]
+    frame.instance_id[is_hit], frame.prim_id[is_hit] = image.owners(triangle, instance)
     for name in "tuv":
         getattr(frame, name)[is_hit] = image.fmt.decode(value(name)[is_hit])
     color = _field(pixels, layout["color"].offset, 24)

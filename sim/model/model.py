@@ -102,9 +102,7 @@ def shade(image, hits, owners, background):
     frame = Frame.empty(width, height, background)
     is_hit = owners[..., 0] >= 0
     triangle, instance = owners[is_hit].T
-    known = image.triangle_instance[triangle]
-    frame.instance_id[is_hit] = np.where(known >= 0, known, np.append(image.instance_ids, -1)[instance])
-    frame.prim_id[is_hit] = image.triangle_prim[triangle]
+    frame.instance_id[is_hit], frame.prim_id[is_hit] = image.owners(triangle, instance)
     frame.t[is_hit], frame.u[is_hit], frame.v[is_hit], cosine = hits[is_hit].T
     one = 1 << INTENSITY_BITS
     intensity = np.minimum(np.abs(cosine) * one, one).astype(np.uint32)

@@ -89,6 +89,12 @@ class SceneImage:
             crc = zlib.crc32(memory.astype("<u4").tobytes(), crc)
         return crc
 
+    def owners(self, triangle, instance):
+        """The scene's ``instance_id`` and ``prim_id`` of the chip's triangle and instance (−1: none) numbers."""
+        known = self.triangle_instance[triangle]
+        told = np.append(self.instance_ids, -1)[instance]
+        return np.where(known >= 0, known, told), self.triangle_prim[triangle]
+
     def matrix_values(self):
         """float64[M, 4, 3]: the three rows and C of each matrix."""
         width = self.fmt.width
