@@ -5,15 +5,10 @@ from types import MappingProxyType, SimpleNamespace
 import numpy as np
 from amaranth.hdl import Cat, Const, Mux, Signal
 
-from .operator import (
-    BinaryOperator,
-    is_inf,
-    is_zero,
-    normalise,
-    normalise_delays,
-    round_and_pack,
-    round_and_pack_delays,
-)
+from .chain import ChainBit, carry_chain
+from .normalise import normalise, normalise_delays
+from .operator import BinaryOperator, is_inf, is_zero
+from .packing import round_and_pack, round_and_pack_delays
 from .pipeline import carry_delay, lut_delay
 from .rounding import Rounding, emulated, round_nearest, round_truncate
 
@@ -50,15 +45,16 @@ def subtract_truncate(params, a, b):
     return add_truncate(params, a, -b)
 
 
-def _align_levels(fmt):
-    # Beyond sig_width + 1 places only sticky is left.
-    return range(min((fmt.sig_width + 1).bit_length(), fmt.exp_width))[::-1]
+def _far_level(fmt):
+    # Of a distance of 2^level and more only a few bits are left, of twice that only sticky.
+    return min((fmt.sig_width + 1).bit_length(), fmt.exp_width) - 1
 
 
 class Adder(BinaryOperator):
     """r = a + b, rounded once.
 
-    One path: order by magnitude, align the smaller, add or subtract, normalise, round.
+    One path: order by exponent, align the smaller, add or subtract, normalise, round. At equal exponents the
+    difference may come out negative; it is exact then, and the rounding makes it positive.
 
     ∞ - ∞ is +0. An exact zero is +0 unless both operands are -0.
 
@@ -81,58 +77,66 @@ class Adder(BinaryOperator):
     @classmethod
     def _step_delays(cls, fmt):
         return {
-            "compare": carry_delay(fmt.frac_width),
+            "distance": carry_delay(fmt.exp_width),
             "order": lut_delay(3),
-            **{f"align_{level}": lut_delay(1) for level in _align_levels(fmt)},
+            # The first one leaves out what is far, too.
+            **{f"align_{level}": lut_delay(1 + (level == _far_level(fmt) - 1)) for level in range(_far_level(fmt))[::-1]},
             "add": carry_delay(fmt.sig_width + 4),
-            **normalise_delays(fmt.sig_width + 4),
+            **normalise_delays(fmt.sig_width + 3),
             **round_and_pack_delays(fmt),
         }
 
     def _compute(self, m, step):
         fmt, a, b = self.fmt, self.a, self.b
-        b_sign = ~b.sign if self._subtracts else b.sign
-        # Both distances and the fractions' order at once: less to wait for than one comparison, then one distance.
-        s = step("compare", a_distance=a.exp - b.exp, b_distance=b.exp - a.exp, below=a.frac < b.frac,
-                 a_exp=a.exp, b_exp=b.exp, a_frac=a.frac, b_frac=b.frac, a_sign=a.sign, b_sign=b_sign,
-                 any_zero=is_zero(a) | is_zero(b), both_zero=is_zero(a) & is_zero(b),
-                 inf=is_inf(a) | is_inf(b), both_inf=is_inf(a) & is_inf(b))
+        subtract = Signal()
+        m.d.comb += subtract.eq(a.sign ^ b.sign ^ self._subtracts)
+        distance = carry_chain(m, "distance", (ChainBit.CARRY, Const(1, 1), 0, 0),
+                               (ChainBit.SUBTRACT, a.exp, b.exp, 0))[1:]
+        # What the last place lets pass it shows inverted.
+        swap = Mux(a.exp[-1] == b.exp[-1], distance[-1], b.exp[-1])
+        a_inf, b_inf, a_zero, b_zero, invalid = (Signal(name=name) for name in (
+            "a_inf", "b_inf", "a_zero", "b_zero", "invalid"))
+        m.d.comb += [a_inf.eq(is_inf(a)), b_inf.eq(is_inf(b)), a_zero.eq(is_zero(a)), b_zero.eq(is_zero(b)),
+                     invalid.eq(a_inf & b_inf & subtract)]
+        s = step("distance", distance=distance, swap=swap, a_exp=a.exp, b_exp=b.exp, a_frac=a.frac, b_frac=b.frac,
+                 a_sign=a.sign, subtract=subtract, a_zero=a_zero, b_zero=b_zero, inf=(a_inf | b_inf) & ~invalid,
+                 invalid=invalid, unsigned=invalid | a_zero & b_zero & subtract)
 
-        exp_below = s.a_distance[-1]
-        swap, subtract, invalid = Signal(), Signal(), Signal()
-        m.d.comb += [swap.eq(exp_below | ~s.b_distance[-1] & s.below),
-                     subtract.eq(s.a_sign ^ s.b_sign), invalid.eq(s.both_inf & subtract)]
-        s = step("order",
-                 distance=Mux(exp_below, s.b_distance, s.a_distance)[:fmt.exp_width],
-                 big_exp=Mux(exp_below, s.b_exp, s.a_exp), big_frac=Mux(swap, s.b_frac, s.a_frac),
-                 small=Mux(s.any_zero, 0, Cat(Const(0, 2), Mux(swap, s.a_frac, s.b_frac), Const(1, 1))),
-                 sticky=Const(0), subtract=subtract, zero=invalid, inf=s.inf & ~invalid,
-                 sign=Mux(swap, s.b_sign, s.a_sign) & ~(invalid | s.both_zero & subtract))
+        # Where b is ahead its distance is one less than the complement says: a is moved by that one as it is chosen.
+        swap, far_level = s.swap, _far_level(fmt)
+        distance = s.distance ^ swap.replicate(fmt.exp_width)
+        small_zero = Mux(swap, s.a_zero, s.b_zero)
+        beyond, far = distance[far_level + 1:].any(), distance[far_level]
+        s = step("order", distance=distance[:far_level], near=~(small_zero | beyond | far),
+                 far=far & ~(small_zero | beyond), sticky=beyond & ~small_zero,
+                 small=Mux(swap, Cat(Const(0, 1), s.a_frac, Const(1, 2)), Cat(Const(0, 2), s.b_frac, Const(1, 1))),
+                 big_exp=Mux(swap, s.b_exp, s.a_exp), big_frac=Mux(swap, s.b_frac, s.a_frac),
+                 sign=(s.a_sign ^ swap & s.subtract) & ~s.unsigned, subtract=s.subtract, zero=s.invalid, inf=s.inf)
 
-        for level in _align_levels(fmt):
+        # In the tables of the next shift, what is far or zero can be left out for nothing.
+        near, left = s.small & s.near.replicate(len(s.small)), len(s.small) - (1 << far_level)
+        small = Cat(near[:left] | s.small[-left:] & s.far.replicate(left), near[left:])
+        s.sticky = s.sticky | s.far & s.small[:-left].any()
+        for level in range(far_level)[::-1]:
             places = 1 << level
-            far = s.distance[level]
-            small, sticky = Mux(far, s.small >> places, s.small), s.sticky | far & s.small[:places].any()
-            if level == _align_levels(fmt)[0]:
-                beyond = (s.distance >> level + 1).any()
-                small, sticky = Mux(beyond, 0, small), Mux(beyond, s.small.any(), sticky)
-            if level == 0:
-                # In the tables of the last shift the complement costs nothing.
-                small = Cat(sticky, small, Const(0, 1)) ^ s.subtract.replicate(fmt.sig_width + 4)
-            s = step(f"align_{level}", s, small=small, sticky=sticky)
+            moves = s.distance[level]
+            s = step(f"align_{level}", s, small=Mux(moves, small >> places, small),
+                     sticky=s.sticky | moves & small[:places].any())
+            small = s.small
 
-        # One more place for the carry in of a subtraction.
-        big = Cat(s.subtract, Const(0, 3), s.big_frac, Const(1, 2))
-        s = step("add", magnitude=(big + Cat(s.subtract, s.small))[1:fmt.sig_width + 5], exp_above=s.big_exp + 2,
+        total = carry_chain(m, "significands", (ChainBit.CARRY, s.subtract, s.sticky, 0),
+                            (ChainBit.ADD, Cat(Const(0, 2), s.big_frac, Const(1, 2)), Cat(small, Const(0, 1)),
+                             s.subtract))[1:]
+        s = step("add", magnitude=total, negative=total[-1] & s.subtract, sticky=s.sticky, exp=s.big_exp,
                  subtract=s.subtract, zero=s.zero, inf=s.inf, sign=s.sign)
-        s = normalise(step, s)
-        cancelled = ~s.magnitude[-1] & ~s.inf
-        # exp_above - shift - 1, without a carry
-        exp = s.exp_above + (~Cat(s.shift, Const(0, 1))).as_signed()
-        s = SimpleNamespace(sig=Cat(s.magnitude[3:], Const(0, 1)), sticky=s.magnitude[:3].any(),
-                            exp=exp, exp_carried=s.exp_above - s.shift,
-                            zero=s.zero | cancelled, inf=s.inf, sign=s.sign & ~(cancelled & s.subtract))
-        m.d.comb += self.r.eq(round_and_pack(step, s, fmt=fmt, rounding=self.rounding))
+        s = normalise(step, SimpleNamespace(**vars(s)))
+        sum_sign = s.sign ^ s.negative
+        # An exact zero
+        cancelled = ~(s.sig[-2:] | s.shifted[-2:]).any() & ~s.inf
+        s = SimpleNamespace(**vars(s) | {
+            "exp": Cat(s.exp, Const(0, 1)).as_signed(), "zero": s.zero | cancelled,
+            "sign": sum_sign & ~(cancelled & s.subtract)})
+        m.d.comb += self.r.eq(round_and_pack(step, m, s, fmt=fmt, rounding=self.rounding))
 
 
 class Subtractor(Adder):

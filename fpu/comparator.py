@@ -1,8 +1,9 @@
 """Comparison."""
 
-from amaranth.hdl import Cat, Mux
+from amaranth.hdl import Mux, Signal
 from amaranth.lib.wiring import In, Out
 
+from .chain import ChainBit, carry_chain
 from .operator import FloatOperator, is_zero
 from .pipeline import carry_delay, lut_delay
 
@@ -33,16 +34,23 @@ class Comparator(FloatOperator):
 
     @classmethod
     def _step_delays(cls, fmt):
-        return {"subtract": carry_delay(fmt.width), "reduce": lut_delay(2), "decide": lut_delay(2)}
+        return {"compare": lut_delay(2) + carry_delay(fmt.width), "reduce": lut_delay(2), "decide": lut_delay(2)}
 
     def _compute(self, m, step):
         a, b = self.a, self.b
-        # One carry chain gives both orders: its sign is "less", its zero is "equal".
-        s = step("subtract", difference=Cat(a.frac, a.exp) - Cat(b.frac, b.exp),
-                 both_zero=is_zero(a) & is_zero(b), a_sign=a.sign, b_sign=b.sign)
-        s = step("reduce", below=s.difference[-1], equal=s.difference[:-1] == 0,
-                 both_zero=s.both_zero, a_sign=s.a_sign, b_sign=s.b_sign)
-        eq = s.both_zero | s.equal & (s.a_sign == s.b_sign)
-        lt = ~eq & Mux(s.a_sign == s.b_sign, s.below ^ s.a_sign, s.a_sign)
+        # One carry chain gives both orders: ones all along it are "equal", and what would leave it is "less". Of zeros
+        # the fraction does not count.
+        a_zero = Signal()
+        m.d.comb += a_zero.eq(is_zero(a))
+        order = carry_chain(m, "order", (ChainBit.COMPARE, a.frac, b.frac, a_zero), (ChainBit.COMPARE, a.exp, b.exp, 0))
+        s = step("compare", ones=order, a_top=a.exp[-1], b_top=b.exp[-1], a_zero=a_zero, a_sign=a.sign, b_sign=b.sign)
+        # The last place passed the carry on that it shows inverted, or decided.
+        below = Mux(s.a_top == s.b_top, ~s.ones[-1], s.b_top)
+        s = step("reduce", below=below, equal=s.ones.all(), same=s.a_zero | (s.a_sign == s.b_sign),
+                 a_sign=s.a_sign, b_sign=s.b_sign)
+        eq = Signal()
+        lt = Signal()
+        m.d.comb += [eq.eq(s.equal & s.same),
+                     lt.eq(~eq & Mux(s.a_sign == s.b_sign, s.below ^ s.a_sign, s.a_sign))]
         s = step("decide", lt=lt, eq=eq, gt=~(lt | eq))
         m.d.comb += [self.lt.eq(s.lt), self.eq.eq(s.eq), self.gt.eq(s.gt)]

@@ -2,18 +2,12 @@
 
 from types import MappingProxyType, SimpleNamespace
 
-from amaranth.hdl import Cat, Const, Mux, Shape
+from amaranth.hdl import Cat, Const, Mux, Shape, Signal, signed
 from amaranth.lib.wiring import In, Out
 
-from .operator import (
-    Operator,
-    is_inf,
-    is_zero,
-    normalise,
-    normalise_delays,
-    round_and_pack,
-    round_and_pack_delays,
-)
+from .normalise import normalise, normalise_delays
+from .operator import Operator, is_inf, is_zero
+from .packing import round_and_pack, round_and_pack_delays
 from .pipeline import carry_delay, lut_delay
 from .rounding import Rounding, emulated, round_nearest, round_truncate
 
@@ -21,33 +15,36 @@ __all__ = ["FloatToInt", "IntToFloat", "float_to_int", "int_to_float", "int_to_f
 
 
 @emulated
-def int_to_float(params, i):
-    """Integer ``i``, of up to 53 bits, rounded to nearest even."""
-    return round_nearest(params, float(i))
+def int_to_float(params, i, unit=1.0):
+    """Integer ``i``, of up to 53 bits, times ``unit``, a power of two, rounded to nearest even."""
+    return round_nearest(params, float(i) * unit)
 
 
 @emulated
-def int_to_float_truncate(params, i):
-    """Integer ``i``, of up to 53 bits, rounded towards zero."""
-    return round_truncate(params, float(i))
+def int_to_float_truncate(params, i, unit=1.0):
+    """Integer ``i``, of up to 53 bits, times ``unit``, a power of two, rounded towards zero."""
+    return round_truncate(params, float(i) * unit)
 
 
 @emulated
-def float_to_int(a, lowest, highest):
-    """Integer part of ``a``, but not below ``lowest`` nor above ``highest``."""
-    return int(min(max(a, float(lowest)), float(highest)))
+def float_to_int(a, lowest, highest, unit=1.0):
+    """Integer part of ``a`` in units of ``unit``, but not below ``lowest`` nor above ``highest``."""
+    return int(min(max(a / unit, float(lowest)), float(highest)))
 
 
 class _Conversion(Operator):
-    def __init__(self, fmt, members, *, int_width, signed, **parameters):
+    def __init__(self, fmt, members, *, int_width, signed, num_frac_bits, **parameters):
         if not 1 <= int_width <= 53:
             raise ValueError(f"Integer width must be between 1 and 53 bits, not {int_width!r}")
+        if not -64 <= num_frac_bits <= 64:
+            raise ValueError(f"Number of fraction bits must be between -64 and 64, not {num_frac_bits!r}")
         self.int_shape = Shape(int_width, signed)
+        self.num_frac_bits = num_frac_bits
         super().__init__(fmt, members(self.int_shape), **parameters)
 
 
 class IntToFloat(_Conversion):
-    """r = i, rounded once; beyond the largest value ±∞.
+    """r = i * 2^-num_frac_bits, rounded once; beyond the largest value ±∞.
 
     Parameters
     ----------
@@ -57,6 +54,8 @@ class IntToFloat(_Conversion):
         Bits of the integer, 1 to 53.
     signed : bool
         Whether it is in two's complement.
+    num_frac_bits : int
+        How many of its bits stand behind the binary point, -64 to 64: none for an integer.
 
     Members
     -------
@@ -68,15 +67,16 @@ class IntToFloat(_Conversion):
     Raises
     ------
     ValueError
-        If ``int_width`` is outside its limits or ``latency`` negative.
+        If ``int_width`` or ``num_frac_bits`` is outside its limits or ``latency`` negative.
     """
 
-    #: Compiled emulation by rounding: ``f(fmt.params, i)``.
+    #: Compiled emulation by rounding: ``f(fmt.params, i, 2^-num_frac_bits)``.
     emulation = MappingProxyType({Rounding.NEAREST_EVEN: int_to_float, Rounding.TRUNCATE: int_to_float_truncate})
 
-    def __init__(self, fmt, *, int_width, signed=True, latency=None, rounding=Rounding.NEAREST_EVEN):
+    def __init__(self, fmt, *, int_width, signed=True, num_frac_bits=0, latency=None, rounding=Rounding.NEAREST_EVEN):
         super().__init__(fmt, lambda shape: {"i": In(shape), "r": Out(fmt)},
-                         int_width=int_width, signed=signed, latency=latency, rounding=rounding)
+                         int_width=int_width, signed=signed, num_frac_bits=num_frac_bits,
+                         latency=latency, rounding=rounding)
 
     def _delays(self):
         return {"magnitude": carry_delay(self.int_shape.width),
@@ -86,24 +86,22 @@ class IntToFloat(_Conversion):
     @property
     def _magnitude_width(self):
         # Room for the guard bit below the significand.
-        return max(self.int_shape.width, self.fmt.sig_width + 1)
+        return max(self.int_shape.width, self.fmt.sig_width + 2)
 
     def _compute(self, m, step):
         fmt, int_width, width = self.fmt, self.int_shape.width, self._magnitude_width
         sign = self.i[-1] if self.int_shape.signed else Const(0)
         magnitude = Mux(sign, -self.i, self.i)[:int_width]
-        s = step("magnitude", sign=sign, magnitude=Cat(Const(0, width - int_width), magnitude))
+        s = step("magnitude", sign=sign, magnitude=Cat(Const(0, width - int_width), magnitude), negative=Const(0, 1))
         s = normalise(step, s)
-        below = width - fmt.sig_width - 1
-        exp = fmt.bias + int_width - 1
-        s = SimpleNamespace(sig=Cat(s.magnitude[below:], Const(0, 1)), sticky=s.magnitude[:below].any(),
-                            exp=exp - s.shift, exp_carried=exp + 1 - s.shift,
-                            zero=~s.magnitude[-1], inf=Const(0), sign=s.sign)
-        m.d.comb += self.r.eq(round_and_pack(step, s, fmt=fmt, rounding=self.rounding))
+        exp = fmt.bias + int_width - 2 - self.num_frac_bits
+        s = SimpleNamespace(**vars(s), sticky=Const(0, 1), exp=Const(exp, signed(2 + max(exp.bit_length(), width.bit_length()))),
+                            zero=~(s.sig[-2:] | s.shifted[-2:]).any(), inf=Const(0, 1))
+        m.d.comb += self.r.eq(round_and_pack(step, m, s, fmt=fmt, rounding=self.rounding))
 
 
 class FloatToInt(_Conversion):
-    """r = a, truncated towards zero, and the nearest integer there is where it is out of range.
+    """r = a * 2^num_frac_bits, truncated towards zero, and the nearest integer there is where it is out of range.
 
     Parameters
     ----------
@@ -113,6 +111,8 @@ class FloatToInt(_Conversion):
         Bits of the integer, 1 to 53.
     signed : bool
         Whether it is in two's complement.
+    num_frac_bits : int
+        How many of its bits stand behind the binary point, -64 to 64: none for an integer.
 
     Members
     -------
@@ -124,12 +124,13 @@ class FloatToInt(_Conversion):
     Raises
     ------
     ValueError
-        If ``int_width`` is outside its limits or ``latency`` negative.
+        If ``int_width`` or ``num_frac_bits`` is outside its limits or ``latency`` negative.
     """
 
-    def __init__(self, fmt, *, int_width, signed=True, latency=None):
+    def __init__(self, fmt, *, int_width, signed=True, num_frac_bits=0, latency=None):
         super().__init__(fmt, lambda shape: {"a": In(fmt), "r": Out(shape)},
-                         int_width=int_width, signed=signed, latency=latency)
+                         int_width=int_width, signed=signed, num_frac_bits=num_frac_bits,
+                         latency=latency)
 
     @property
     def _magnitude_width(self):
@@ -148,18 +149,21 @@ class FloatToInt(_Conversion):
     def _compute(self, m, step):
         fmt, a, width = self.fmt, self.a, self._magnitude_width
         # Aligned to the top, the significand is to go right by what the exponent lacks of its highest.
-        s = step("distance", distance=fmt.bias + width - 1 - a.exp, sign=a.sign, zero=is_zero(a), inf=is_inf(a),
+        farthest = fmt.bias + width - 1 - self.num_frac_bits
+        distance = Signal(signed(2 + max(farthest.bit_length(), fmt.exp_width, len(self._levels))))
+        m.d.comb += distance.eq(farthest - a.exp)
+        s = step("distance", distance=distance, sign=a.sign, zero=is_zero(a), inf=is_inf(a),
                  magnitude=Cat(Const(0, width - fmt.sig_width), a.frac, Const(1, 1)))
         for level in self._levels:
             s = step(f"shift_{level}", s,
                      magnitude=Mux(s.distance[level], s.magnitude >> (1 << level), s.magnitude))
 
-        int_width, signed = self.int_shape.width, self.int_shape.signed
-        highest, lowest = (1 << int_width - signed) - 1, -(signed << int_width - 1)
-        above = s.inf | (s.distance < 0)
+        int_width, is_signed = self.int_shape.width, self.int_shape.signed
+        highest, lowest = (1 << int_width - is_signed) - 1, -(is_signed << int_width - 1)
+        above = s.inf | ~s.zero & (s.distance < 0)
         below = ~above & (s.zero | (s.distance >> len(self._levels)).any())
         over = above | ~below & (s.magnitude > highest)
-        s = step("negate", integer=Mux(s.sign, -s.magnitude if signed else 0, s.magnitude)[:int_width],
+        s = step("negate", integer=Mux(s.sign, -s.magnitude if is_signed else 0, s.magnitude)[:int_width],
                  limit=Mux(s.sign, lowest, highest), over=over, zero=below)
         s = step("saturate", r=Mux(s.over, s.limit, Mux(s.zero, 0, s.integer)))
         m.d.comb += self.r.eq(s.r)

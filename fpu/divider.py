@@ -2,10 +2,12 @@
 
 from types import MappingProxyType, SimpleNamespace
 
-from amaranth.hdl import Cat, Const, Mux, Signal, signed
+from amaranth.hdl import Cat, Const
 
-from .operator import BinaryOperator, is_inf, is_zero, round_and_pack, round_and_pack_delays
-from .pipeline import carry_delay, lut_delay
+from .chain import ChainBit, carry_chain
+from .operator import BinaryOperator, is_inf, is_zero
+from .packing import round_and_pack, round_and_pack_delays
+from .pipeline import carry_delay
 from .rounding import Rounding, emulated, round_nearest, round_truncate
 
 __all__ = ["Divider", "divide", "divide_truncate"]
@@ -32,7 +34,7 @@ def _quotient_bits(fmt):
 
 
 class Divider(BinaryOperator):
-    """r = a / b, rounded once, by restoring digit recurrence of radix 2.
+    """r = a / b, rounded once, by non-restoring digit recurrence of radix 2.
 
     x / 0 is ±∞ for x ≠ 0; 0 / 0 and ∞ / ∞ are +0. A stage holds as many quotient bits as its share of the depth asks.
 
@@ -53,37 +55,30 @@ class Divider(BinaryOperator):
 
     @classmethod
     def _step_delays(cls, fmt):
-        delays = {}
-        for bit in _quotient_bits(fmt):
-            delays[f"subtract_{bit}"] = carry_delay(fmt.sig_width + 1)
-            delays[f"restore_{bit}"] = lut_delay(1.3)
-        del delays["restore_0"]
-        return delays | round_and_pack_delays(fmt)
+        return {f"digit_{bit}": carry_delay(fmt.sig_width + 1) for bit in _quotient_bits(fmt)} \
+            | round_and_pack_delays(fmt)
 
     def _compute(self, m, step):
         fmt, a, b = self.fmt, self.a, self.b
         zero = is_zero(a) | is_inf(b)
         inf = is_inf(a) | is_zero(b)
-        # Of a quotient below 1 this is one too many
+        # The chain lacks one, and so does the bias, one less than a power of two: the rest is the upper bits'.
         above = fmt.exp_width - 1
-        exp_distance = Signal(signed(fmt.exp_width + 1))
-        exp = Signal(signed(fmt.exp_width + 2))
-        m.d.comb += [exp_distance.eq(Cat(a.exp, 0, 0).as_signed() + (~Cat(b.exp, 0)).as_signed()),
-                     exp.eq(Cat(exp_distance[:above], exp_distance[above:].as_signed() + 1))]
-        # The remainder is kept complemented: ~(r - d) = ~r + d is a carry chain that begins without a carry.
-        s = SimpleNamespace(remainder=~Cat(a.frac, Const(1, 2)), divisor=Cat(b.frac, Const(1, 1)),
-                            quotient=Const(0, 0), exp=exp,
+        distance = carry_chain(m, "exponent",
+                               (ChainBit.SUBTRACT, Cat(a.exp, Const(0, 1)), Cat(b.exp, Const(0, 1)), 0))
+        exp = Cat(distance[:above], distance[above:].as_signed() + 1)[:fmt.exp_width + 2].as_signed()
+        # Twice the remainder; the divisor, with a place for the sign and one in which it comes out inverted.
+        s = SimpleNamespace(dividend=Cat(a.frac, Const(1, 3)), returns=Const(0, 1),
+                            divisor=Cat(b.frac, Const(0b101, 3)), quotient=Const(0, 0), exp=exp,
                             zero=zero, inf=inf & ~zero, sign=(a.sign ^ b.sign) & ~(zero & inf))
 
         for bit in _quotient_bits(fmt):
-            s = step(f"subtract_{bit}", s, difference=(s.remainder + s.divisor)[:fmt.sig_width + 1])
-            fits = s.difference[-1]
-            quotient = Cat(fits, s.quotient)
-            if bit:
-                remainder = Mux(fits, s.difference, s.remainder)[:fmt.sig_width]
-                s = step(f"restore_{bit}", s, remainder=Cat(Const(1, 1), remainder), quotient=quotient)
+            # Of a divisor that was too much half is given back: that is to take the next one.
+            remainder = carry_chain(m, f"remainder_{bit}", (ChainBit.CARRY, Const(1, 1), s.returns, 0),
+                                    (ChainBit.SUBTRACT, s.dividend, s.divisor, s.returns))[1:]
+            s = step(f"digit_{bit}", s, dividend=Cat(Const(0, 1), remainder[:-1]), returns=remainder[-2],
+                     quotient=Cat(remainder[-1], s.quotient))
 
         # A quotient is never halfway between two members, so what remains does not matter.
-        s = SimpleNamespace(sig=quotient, sticky=Const(1), exp=s.exp - 1, exp_carried=s.exp,
-                            zero=s.zero, inf=s.inf, sign=s.sign)
-        m.d.comb += self.r.eq(round_and_pack(step, s, fmt=fmt, rounding=self.rounding))
+        s = SimpleNamespace(sig=s.quotient, sticky=Const(1), exp_above=s.exp, zero=s.zero, inf=s.inf, sign=s.sign)
+        m.d.comb += self.r.eq(round_and_pack(step, m, s, fmt=fmt, rounding=self.rounding))

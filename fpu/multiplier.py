@@ -2,9 +2,11 @@
 
 from types import MappingProxyType, SimpleNamespace
 
-from amaranth.hdl import Cat, Const, Signal, signed
+from amaranth.hdl import Cat, Const
 
-from .operator import BinaryOperator, is_inf, is_zero, round_and_pack, round_and_pack_delays
+from .chain import ChainBit, carry_chain
+from .operator import BinaryOperator, is_inf, is_zero
+from .packing import round_and_pack, round_and_pack_delays
 from .pipeline import product_delay
 from .product import Product
 from .rounding import Rounding, emulated, round_nearest, round_truncate
@@ -55,14 +57,11 @@ class Multiplier(BinaryOperator):
         # Zeros take part with a hidden bit; `zero` overrides what comes of it, so the block waits for no logic.
         m.submodules.significand = significand = Product(fmt.sig_width, cycles=step.next_registers)
         m.d.comb += [significand.a.eq(Cat(a.frac, Const(1, 1))), significand.b.eq(Cat(b.frac, Const(1, 1)))]
-        s = step("multiply", exp_sum=(Cat(Const(1, 1), a.exp) + Cat(Const(1, 1), b.exp))[1:],
-                 zero=zero, inf=inf & ~zero, sign=(a.sign ^ b.sign) & ~(zero & inf))
-
-        # The bias is one less than a power of two: that one went in as a carry, the power is the upper bits'.
+        # The bias is one less than a power of two: that one goes in as a carry, the power is the upper bits'.
+        exp_sum = carry_chain(m, "exponent", (ChainBit.CARRY, Const(1, 1), 0, 0),
+                              (ChainBit.ADD, Cat(a.exp, Const(0, 1)), Cat(b.exp, Const(0, 1)), 0))[1:]
+        s = step("multiply", exp_sum=exp_sum, zero=zero, inf=inf & ~zero, sign=(a.sign ^ b.sign) & ~(zero & inf))
         above = fmt.exp_width - 1
-        exp = Signal(signed(fmt.exp_width + 2))
-        m.d.comb += exp.eq(Cat(s.exp_sum[:above], s.exp_sum[above:] - 1))
-        below = fmt.sig_width - 2
-        s = SimpleNamespace(sig=significand.p[below:], sticky=significand.p[:below].any(),
-                            exp=exp, exp_carried=exp + 1, zero=s.zero, inf=s.inf, sign=s.sign)
-        m.d.comb += self.r.eq(round_and_pack(step, s, fmt=fmt, rounding=self.rounding))
+        exp = Cat(s.exp_sum[:above], s.exp_sum[above:] - 1)[:fmt.exp_width + 2].as_signed()
+        s = SimpleNamespace(sig=significand.p, sticky=Const(0), exp=exp, zero=s.zero, inf=s.inf, sign=s.sign)
+        m.d.comb += self.r.eq(round_and_pack(step, m, s, fmt=fmt, rounding=self.rounding))

@@ -1,16 +1,13 @@
-"""What the operators share: their parameters, their depth, rounding and packing of a result."""
+"""What the operators share: their parameters and their depth."""
 
-from types import SimpleNamespace
-
-from amaranth.hdl import Cat, Const, Module, Mux
+from amaranth.hdl import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from .pipeline import Pipeline, carry_delay, depth_for, lut_delay
+from .pipeline import Pipeline, depth_for
 from .rounding import Rounding
 
-__all__ = ["BinaryOperator", "FloatOperator", "Operator", "is_inf", "is_zero", "normalise", "normalise_delays",
-           "round_and_pack", "round_and_pack_delays"]
+__all__ = ["BinaryOperator", "FloatOperator", "Operator", "UnaryOperator", "is_inf", "is_zero"]
 
 
 def is_zero(x):
@@ -72,7 +69,7 @@ class Operator(wiring.Component):
 
 
 class FloatOperator(Operator):
-    """Operator on two floats, ``a`` and ``b``, whose delays depend on their format alone."""
+    """Operator on floats whose delays depend on their format alone."""
 
     @classmethod
     def default_latency(cls, fmt):
@@ -98,57 +95,11 @@ class BinaryOperator(FloatOperator):
         super().__init__(fmt, {"a": In(fmt), "b": In(fmt), "r": Out(fmt)}, latency=latency, rounding=rounding)
 
 
-def normalise_delays(width):
-    """Delays of the steps of :func:`normalise` on ``width`` bits."""
-    # A tree of tables that looks at 2^level bits, and the one that shifts.
-    return {f"normalise_{level}": lut_delay((level + 1) // 2 + 1) for level in range((width - 1).bit_length())[::-1]}
+class UnaryOperator(FloatOperator):
+    """Operator on a float ``a`` with a float result ``r``."""
 
+    #: Compiled emulation by rounding: ``f(fmt.params, a)``, exact, on float64 values that are members.
+    emulation = None
 
-def normalise(step, s):
-    """``s`` with ``s.magnitude`` shifted left until its top bit is set, if any is, and with the ``shift`` it took."""
-    width = len(s.magnitude)
-    s = SimpleNamespace(**vars(s), shift=Const(0, 0))
-    for level in range((width - 1).bit_length())[::-1]:
-        places = 1 << level
-        clear = ~s.magnitude[-places:].any()
-        s = step(f"normalise_{level}", s, shift=Cat(clear, s.shift),
-                 magnitude=Mux(clear, s.magnitude << places, s.magnitude)[:width])
-    return s
-
-
-def round_and_pack_delays(fmt):
-    """Delays of the steps of :func:`round_and_pack`."""
-    return {"round": carry_delay(fmt.sig_width + 2), "range": lut_delay(3), "pack": lut_delay(1.5)}
-
-
-def round_and_pack(step, s, *, fmt, rounding):
-    """Float (-1)^sign * 2^(exp - bias) * sig, rounded once, with overflow, underflow and special cases.
-
-    ``s.sig`` is in [1, 4), with ``sig_width`` fraction bits, the last of them the guard bit below 2. ``s.sticky`` says
-    that there are nonzero bits below. ``s.exp`` and ``s.exp_carried``, one more, are signed; ``s.zero`` and ``s.inf``,
-    never both, override the value.
-    """
-    above_two = s.sig[-1]
-    rounded, tie = s.sig, Const(0)
-    if rounding is Rounding.NEAREST_EVEN:
-        # Half a unit is injected whichever place it has, without waiting for sticky; a tie that this has brought to
-        # an odd fraction was even before, so clearing the last bit mends it.
-        rounded = (s.sig + Cat(~above_two, above_two))[:len(s.sig)]
-        tie = ~s.sticky & Mux(above_two, s.sig[:2] == 0b10, s.sig[0])
-    # Whether rounding carries is not known before the end of the step: both exponents are made.
-    s = step("round", sig=rounded, tie=tie, exp=s.exp, exp_carried=s.exp_carried,
-             zero=s.zero, inf=s.inf, sign=s.sign)
-
-    above_two = s.sig[-1]
-    # Bit by bit, each of whichever exponent makes it cheap: a comparison would become a carry chain.
-    under = s.exp[-1] | ~above_two & (s.exp == 0)
-    over = ~s.exp_carried[-1] & s.exp_carried[fmt.exp_width:-1].any()
-    over |= above_two & (s.exp_carried == fmt.exp_inf)
-    s = step("range", sig=s.sig, tie=s.tie, sign=s.sign,
-             exp=Mux(above_two, s.exp_carried, s.exp)[:fmt.exp_width],
-             zero=s.zero | ~s.inf & under, inf=s.inf | ~s.zero & over)
-
-    above_two = s.sig[-1]
-    frac = Mux(above_two, Cat(s.sig[2] & ~s.tie, s.sig[3:-1]), Cat(s.sig[1] & ~s.tie, s.sig[2:-2]))
-    exp = Mux(s.inf, fmt.exp_inf, Mux(s.zero, 0, s.exp))
-    return step("pack", r=Cat(Mux(s.inf | s.zero, 0, frac), exp, s.sign)).r
+    def __init__(self, fmt, *, latency=None, rounding=Rounding.NEAREST_EVEN):
+        super().__init__(fmt, {"a": In(fmt), "r": Out(fmt)}, latency=latency, rounding=rounding)

@@ -9,3 +9,9 @@ def clocked(dut):
     m.submodules.dut = dut
     m.d.sync += Signal(name="tick").eq(1)
     return m
+
+
+class ECP5:
+    """Platform for which operators instantiate an ECP5's own cells."""
+
+    device = "LFE5U-85F"

@@ -84,7 +84,7 @@ def order(a, b, *fmt):
     return 1 if a < b else 2 if a == b else 4
 
 
-def to_int(a, lowest, highest, *fmt):
-    sign, magnitude = unpack(a, *fmt)
-    value = copysign(inf, -sign) if isinf(magnitude) else (-1) ** sign * int(magnitude)
+def to_int(a, lowest, highest, exp_width, frac_width, num_frac_bits=0):
+    sign, magnitude = unpack(a, exp_width, frac_width)
+    value = copysign(inf, -sign) if isinf(magnitude) else (-1) ** sign * int(magnitude * Fraction(2) ** num_frac_bits)
     return int(min(max(value, lowest), highest))

@@ -6,7 +6,7 @@ from amaranth.back import rtlil
 
 from fpu import Adder, Comparator, Divider, FloatFormat, Multiplier, Rounding, Subtractor
 from fpu.product import Product
-from tests.fpu import reference
+from tests.fpu import ECP5, reference
 from tests.fpu.verilated import Bank
 
 TINY, TINIEST = FloatFormat(3, 2), FloatFormat(2, 3)
@@ -15,7 +15,7 @@ NUMPY = {FloatFormat(5, 10): np.float16, FloatFormat(8, 23): np.float32}
 EXACT = {Adder: reference.add, Subtractor: reference.subtract, Multiplier: reference.multiply,
          Divider: reference.divide}
 # One more than the steps there are to put registers behind
-MAX_LATENCY = {Adder: 17, Multiplier: 5, Divider: 13, Comparator: 4}
+MAX_LATENCY = {Adder: 11, Multiplier: 5, Divider: 9, Comparator: 4}
 
 
 @pytest.fixture(scope="session")
@@ -134,10 +134,6 @@ def test_emulation(cls, rounding, fmt, pairs):
     assert (fmt.quantize(got) == got).all()
 
 
-class ECP5:
-    device = "LFE5U-85F"
-
-
 @pytest.mark.parametrize("latency", range(1, 6))
 def test_block_has_the_output_register(latency):
     """One multiplier block, with one register less outside it."""
@@ -152,6 +148,11 @@ def test_block_has_the_output_register(latency):
 def test_block_is_left_to_inference():
     for product in (Product(17, cycles=0), Product(19, cycles=1)):
         assert "MULT18X18D" not in rtlil.convert(product, platform=ECP5())
+
+
+@pytest.mark.parametrize(("cls", "most"), MAX_LATENCY.items(), ids=lambda value: getattr(value, "__name__", ""))
+def test_every_latency_is_tested(cls, most):
+    assert 0 < len(cls(TINY, latency=0)._delays()) < most
 
 
 def test_negative_latency():

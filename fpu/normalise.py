@@ -1,0 +1,48 @@
+"""Normalising a significand."""
+
+from types import SimpleNamespace
+
+from amaranth.hdl import Cat, Const, Mux
+
+from .pipeline import lut_delay
+
+__all__ = ["normalise", "normalise_delays"]
+
+
+def normalise_delays(width):
+    """Delays of the steps of :func:`normalise` on ``width`` bits."""
+    # A tree of tables that looks at 2^level bits, and the one that shifts; the last step shifts in the rounding.
+    levels = _normalise_levels(width)
+    return {f"normalise_{level}": lut_delay((level + 1) // 2 + (level != levels[-1])) for level in levels}
+
+
+def _normalise_levels(width):
+    return range(1, (width - 1).bit_length())[::-1]
+
+
+def normalise(step, s):
+    """``s`` with ``s.magnitude`` made the ``sig`` that :func:`round_and_pack` takes, of the same width.
+
+    It is shifted left by an even number of places, until its upper two bits are not both zero, if any is not: the
+    ``exp_offset`` is what that takes from the exponent. Where ``s.negative``, it stands for minus its two's complement.
+    """
+    width, levels = len(s.magnitude), _normalise_levels(len(s.magnitude))
+    s = SimpleNamespace(**vars(s), halvings=Const(0, 0))
+    complement = s.negative
+    for level in levels:
+        places = 1 << level
+        # -x = ~x + 1: the ones that are shifted in lead the 1, which the rounding adds, to where it belongs.
+        magnitude = s.magnitude ^ complement.replicate(width)
+        clear = ~magnitude[-places:].any()
+        shifted = Cat(s.negative.replicate(places), magnitude[:-places])
+        halvings = Cat(clear, s.halvings)
+        if level == levels[-1]:
+            s = step(f"normalise_{level}", s, sig=magnitude, shifted=shifted, shifts=clear, halvings=halvings)
+        else:
+            s = step(f"normalise_{level}", s, magnitude=Mux(clear, shifted, magnitude), halvings=halvings)
+        complement = Const(0, 1)
+    # Minus the number of halvings, in tables: a carry chain would take twice as many.
+    below = [s.halvings[:bit].any() for bit in range(len(s.halvings) + 1)]
+    s.exp_offset = Cat(*(bit ^ any_below for bit, any_below in zip(s.halvings, below, strict=False)),
+                       below[-1]).as_signed()
+    return s
