@@ -5,7 +5,6 @@ import hashlib
 import json
 import os
 import tempfile
-import threading
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -31,10 +30,10 @@ ROUTE = ("--25k", "--package", PACKAGE, "--out-of-context", "--timing-allow-fail
 _CONSTANT_DRIVERS = {"$PACKER_GND", "$PACKER_VCC"}
 
 
-#: The same, but registers may be moved before gates are fitted to tables.
-RETIMING = ("synth_ecp5 -noiopad -top top -run begin:map_ffs; "
-            "dfflegalize -cell $_DFF_P_ 01 -cell $_DFFE_PP_ 01; abc -dff -D 1; "
-            "synth_ecp5 -noiopad -top top -run map_ffs:")
+_WITHOUT_CHAINS = f"{SYNTHESIS} -noccu2"
+#: With registers moved to where they make the slowest path fastest, which cannot be across carry chains: without them.
+RETIMING = (f"{_WITHOUT_CHAINS} -run begin:map_ffs; dfflegalize -cell $_DFF_P_ 01 -cell $_DFFE_PP_ 01; "
+            f"abc -dff -D 1; {_WITHOUT_CHAINS} -run map_ffs:")
 
 
 class _Platform:
@@ -85,10 +84,6 @@ class Placement:
     fmax_mhz: float
 
 
-# Amaranth names signals by looking at the caller's frame, and keeps a little state while it does.
-_elaborating = threading.Lock()
-
-
 def design_of(component, *, name, verilog=None, synthesis=SYNTHESIS):
     """Design of a component between registers, as :func:`~boards.harness.between_registers` puts it.
 
@@ -104,10 +99,9 @@ def design_of(component, *, name, verilog=None, synthesis=SYNTHESIS):
     synthesis : str
         :data:`SYNTHESIS` or :data:`RETIMING`.
     """
-    with _elaborating:
-        m, ports = between_registers(component)
-        # Where in which file something stands must not count as a change.
-        text = rtlil.convert(m, ports=ports, name="top", platform=_Platform(), emit_src=False)
+    m, ports = between_registers(component)
+    # Where in which file something stands must not count as a change.
+    text = rtlil.convert(m, ports=ports, name="top", platform=_Platform(), emit_src=False)
     sources = " ".join(file for file in verilog or () if file.endswith((".v", ".sv")))
     read = f"read_verilog -sv -I. {sources}; " if sources else ""
     return Design(name=name, files={**(verilog or {}), "top.il": text}, script=f"{read}read_rtlil top.il; {synthesis}")
