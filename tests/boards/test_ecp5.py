@@ -75,12 +75,6 @@ def test_same_count_as_by_synthesis_without_harness(tmp_path, latency):
     assert (placed.ff > 0) == (latency > 0)
 
 
-def test_faster_grade_is_faster():
-    design = ecp5.design_of(Comparator(TINY, latency=0), name="Comparator")
-    slow, fast = (ecp5.place(design, grade=grade, seed=1).fmax_mhz for grade in (6, 8))
-    assert 100 < slow < fast
-
-
 def test_what_is_known_is_not_run_again(runs):
     design = ecp5.design_of(Comparator(TINY), name="Comparator")
     assert not ecp5.is_placed(design, grade=6, seed=1)
