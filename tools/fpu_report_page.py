@@ -127,34 +127,37 @@ def _area_time(row):
 
 
 def _peers(results):
-    rows, notes = [], {}
-    for row in results["peers"]:
-        same = {name: row[name] for name in ("operator", "format", "grade")}
-        same |= {"latency": row["latency"]} if row["cycles_per_result"] == 1 else {"default": True}
-        mark = ""
-        if row["note"]:
-            mark = f" [{notes.setdefault(row['note'], len(notes) + 1)}]"
-        latency = f"{row['latency']}{', retimed' if row['retimed'] else ''}"
-        if row["cycles_per_result"] > 1:
-            latency += f", a result every {row['cycles_per_result']} clocks"
-        rows.append([f"{row['name']}{mark}", row["format"], latency, *_resources(row), _mhz(row),
-                     f"{_area_time(row):,.0f}", ""])
-        for ours in _nearest(results, **same):
-            rows.append([f"**{ours['operator']}**", ours["format"], ours["latency"], *_resources(ours), _mhz(ours),
-                         f"{_area_time(ours):,.0f}", f"{_area_time(row) / _area_time(ours):.2f} ×"])
-    parts = [_table(["operator", "format", "latency", *_RESOURCES.values(), "MHz: median / worst",
-                     "LUT × ns a result", "theirs ÷ ours"], rows)]
-    parts += [f"[{number}] {note}\n" for note, number in notes.items()]
-    parts += [f"{name}: {source}.\n" for name, source in _sources(results["peers"]).items()]
+    notes = {}
+    parts = []
+    for is_iterative, title in ((False, "A result every clock:"), (True, "A result every few clocks:")):
+        rows = []
+        for row in results["peers"]:
+            if (row["cycles_per_result"] > 1) == is_iterative:
+                rows += _peer_and_ours(results, row, notes)
+        if rows or not is_iterative:
+            table = _table(["operator", "format", "latency", *_RESOURCES.values(), "MHz: median / worst",
+                            "LUT × ns a result", "theirs ÷ ours"], rows)
+            parts.append(f"{title}\n\n{table}")
+    parts += [f"[{number}] {note}.\n" for note, number in notes.items()]
+    parts += [f"Theirs: {source}.\n" for source in dict.fromkeys(row["source"] for row in results["peers"])]
     return "\n".join(parts)
 
 
-def _sources(peers):
-    """Names of peers by where they come from, each source once."""
-    names = {}
-    for row in peers:
-        names.setdefault(row["source"], row["name"])
-    return {name: source for source, name in names.items()}
+def _peer_and_ours(results, peer, notes):
+    """A peer's row, with the number of its note, and ours to compare it with, if there still is one."""
+    mark = f" [{notes.setdefault(peer['note'], len(notes) + 1)}]" if peer["note"] else ""
+    latency, same = peer["latency"], {name: peer[name] for name in ("operator", "format", "grade", "latency")}
+    if peer["retimed"]:
+        latency = f"{latency}, retimed"
+    if peer["cycles_per_result"] > 1:
+        latency = f"{latency}, a result every {peer['cycles_per_result']}"
+        same = {name: peer[name] for name in ("operator", "format", "grade")} | {"default": True}
+    ours = _nearest(results, **same)
+    quotient = f"{_area_time(peer) / _area_time(ours[0]):.2f}" if ours else "–"
+    return [[f"{peer['name']}{mark}", peer["format"], latency, *_resources(peer), _mhz(peer),
+             f"{_area_time(peer):,.0f}", quotient],
+            *([f"**{row['operator']}**", row["format"], row["latency"], *_resources(row), _mhz(row),
+               f"{_area_time(row):,.0f}", ""] for row in ours)]
 
 
 _PARTS = {"flow": _flow, "default": _default, "targets": _targets, "depth": _depth, "formats": _formats,

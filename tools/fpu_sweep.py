@@ -99,7 +99,7 @@ def measure(points, peers, *, seeds, jobs, console):
     with _progress(console) as progress:
         subjects = [*((point.design(), point.grade) for point in progress.track(points, description="elaborating")),
                     *((peer.design(), 6) for peer in peers)]
-        _place_all(subjects, seeds, jobs, progress)
+        _place_all(subjects, seeds, jobs, progress, console)
         errors = {}
         keys = dict.fromkeys((point.entry.name, point.fmt, point.rounding) for point in points)
         for key in progress.track(keys, description="measuring errors"):
@@ -114,11 +114,12 @@ def measure(points, peers, *, seeds, jobs, console):
 @contextmanager
 def _progress(console):
     with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-                  TimeRemainingColumn(), console=console, disable=not console.is_terminal) as progress:
+                  TimeRemainingColumn(), console=console, disable=not console.is_terminal,
+                  speed_estimate_period=600) as progress:
         yield progress
 
 
-def _place_all(subjects, seeds, jobs, progress):
+def _place_all(subjects, seeds, jobs, progress, console):
     """Make all results known; runs of one design are one after another, so that it is synthesised once."""
     missing = defaultdict(list)
     designs = {}
@@ -127,21 +128,26 @@ def _place_all(subjects, seeds, jobs, progress):
             if not ecp5.is_placed(design, grade=grade, seed=seed):
                 designs[design.folder] = design
                 missing[design.folder].append((grade, seed))
-    task = progress.add_task("place and route", total=sum(map(len, missing.values())))
+    total = sum(map(len, missing.values()))
+    task = progress.add_task("place and route", total=total)
     stopped = threading.Event()
+    done = 0
 
     def run(folder):
         for grade, seed in missing[folder]:
             if stopped.is_set():
-                return
+                break
             ecp5.place(designs[folder], grade=grade, seed=seed)
             progress.advance(task)
+        return folder
 
     with ThreadPoolExecutor(jobs) as pool:
         futures = [pool.submit(run, folder) for folder in missing]
         try:
             for future in as_completed(futures):
-                future.result()
+                done += len(missing[future.result()])
+                if not console.is_terminal:
+                    console.print(f"{done} of {total} runs: {designs[future.result()].name}", markup=False)
         except BaseException:
             stopped.set()
             raise

@@ -66,7 +66,8 @@ def test_one_operator_and_a_peer(docs, tmp_path, monkeypatch):
     arguments = ["--only", "Multiplier", "--seeds", 1, "--peer", peer_file(tmp_path, [PEER])]
     result = run(docs, *arguments)
     assert result.exit_code == 0, result.text
-    assert result.text.strip() == f"6 points of 1 operators and 1 peers; see {docs / 'fpu.md'}"
+    assert "7 of 7 runs: " in result.text
+    assert result.text.endswith(f"6 points of 1 operators and 1 peers; see {docs / 'fpu.md'} ")
 
     text = (docs / "results" / "fpu.json").read_text()
     assert str(tmp_path) not in text
@@ -98,6 +99,7 @@ def test_one_operator_and_a_peer(docs, tmp_path, monkeypatch):
                      re.MULTILINE)
     assert re.search(rf"^\| Shifter \[1\] \| 3\.2 \| {tiny_default}, retimed \| {peer['lut']} \|", page, re.MULTILINE)
     assert "[1] no multiplier at all" in page
+    assert "Theirs: a test, version 1." in page
     table = json.loads((tmp_path / "measured.json").read_text())
     columns = table["columns"]
     assert columns == ["operator", "format", "latency", "lut", "ff", "dsp", "ebr", "fmax_worst_mhz"]
@@ -202,6 +204,26 @@ def test_prose_stays(tmp_path):
     assert first.count("Not measured.") == 8
     path.write_text(first)
     assert filled(path, empty) == first
+
+
+def test_peers_are_compared_with_what_there_is(tmp_path):
+    def row(**fields):
+        return {"operator": "Divider", "format": "7.16", "grade": 6, "latency": 9, "ff": 0, "dsp": 0, "ebr": 0,
+                "fmax_median_mhz": 100, "fmax_worst_mhz": 90} | fields
+
+    peer = row(name="Theirs", source="s", retimed=False, cycles_per_result=1, lut=200, note="")
+    ours = row(lut=400, default=True, rounding="nearest-even", max_ulp=None, mean_ulp=None)
+    iterative = peer | {"name": "Slow", "latency": 20, "cycles_per_result": 10}
+    path = tmp_path / "fpu.md"
+    path.write_text(PAGE.read_text())
+    flow = {"device": "D", "package": "P", "tools": {}, "seeds": [1], "synthesis": "s", "place_and_route": "p"}
+    page = filled(path, {"flow": flow, "operators": [ours], "peers": [peer, peer | {"latency": 3}, iterative]})
+    same, other, slow = re.findall(r"^\| (?:Theirs|Slow) \|.*$", page, re.MULTILINE)
+    # 200 tables × 10 ns beside 400 tables × 10 ns; no divider of latency 3; ten clocks for a result
+    assert same.endswith("| 2,000 | 0.50 |")
+    assert other.endswith("| 2,000 | – |")
+    assert slow.endswith("| 20,000 | 5.00 |")
+    assert "| 20, a result every 10 |" in slow
 
 
 def off_by(units):
