@@ -4,13 +4,14 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light clean
+.PHONY: help setup render test lint first-light fpu-report clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
 	@echo "make test         every test"
 	@echo "make lint         ruff"
 	@echo "make first-light  the figures of docs/first-light.md, from the scenes in SCENES=$(SCENES)"
+	@echo "make fpu-report   the figures of docs/fpu.md: every operator placed and routed; PEER=FILE puts others' beside ours"
 
 setup: $(VENV)/.ready
 
@@ -32,6 +33,9 @@ lint: setup
 
 first-light: setup
 	$(BIN)/dynrt first-light --scenes $(SCENES)
+
+fpu-report: setup
+	$(BIN)/dynrt fpu-report $(if $(PEER),--peer $(PEER))
 
 clean:
 	rm -rf build .pytest_cache .ruff_cache

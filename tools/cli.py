@@ -3,6 +3,7 @@
 import click
 
 from .first_light import first_light
+from .fpu_report import fpu_report
 from .inspect import image
 from .render import render
 
@@ -16,5 +17,6 @@ def main():
 
 
 main.add_command(first_light)
+main.add_command(fpu_report)
 main.add_command(render)
 main.add_command(image)

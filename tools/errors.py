@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from boards.toolchain import ToolError
 from sim.machine import BuildError, SimulationError
 from sim.scene import SceneError
 
@@ -32,7 +33,7 @@ def clear_errors():
         yield
     except (SceneError, OverflowError) as error:
         raise BadInput(str(error)) from error
-    except (BuildError, SimulationError) as error:
+    except (BuildError, SimulationError, ToolError) as error:
         raise Failure(str(error)) from error
 
 
