@@ -80,7 +80,8 @@ class Adder(BinaryOperator):
             "distance": carry_delay(fmt.exp_width),
             "order": lut_delay(3),
             # The first one leaves out what is far, too.
-            **{f"align_{level}": lut_delay(1 + (level == _far_level(fmt) - 1)) for level in range(_far_level(fmt))[::-1]},
+            **{f"align_{level}": lut_delay(2 if level == _far_level(fmt) - 1 else 1)
+               for level in range(_far_level(fmt))[::-1]},
             "add": carry_delay(fmt.sig_width + 4),
             **normalise_delays(fmt.sig_width + 3),
             **round_and_pack_delays(fmt),

@@ -95,7 +95,8 @@ class IntToFloat(_Conversion):
         s = step("magnitude", sign=sign, magnitude=Cat(Const(0, width - int_width), magnitude), negative=Const(0, 1))
         s = normalise(step, s)
         exp = fmt.bias + int_width - 2 - self.num_frac_bits
-        s = SimpleNamespace(**vars(s), sticky=Const(0, 1), exp=Const(exp, signed(2 + max(exp.bit_length(), width.bit_length()))),
+        exp = Const(exp, signed(2 + max(exp.bit_length(), width.bit_length())))
+        s = SimpleNamespace(**vars(s), sticky=Const(0, 1), exp=exp,
                             zero=~(s.sig[-2:] | s.shifted[-2:]).any(), inf=Const(0, 1))
         m.d.comb += self.r.eq(round_and_pack(step, m, s, fmt=fmt, rounding=self.rounding))
 
