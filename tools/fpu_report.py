@@ -68,7 +68,8 @@ def fpu_report(docs, table, only, seeds, jobs, peer):
         for path, content in ((results_path, _json(results)), (table, _table(results)), (page, text)):
             with written_whole(path) as whole:
                 whole.write_text(content)
-    console.print(f"{len(rows)} points of {len(chosen)} operators and {len(peer_rows)} peers; see {page}")
+    console.print(f"{len(rows)} points of {len(chosen)} operators and {len(peer_rows)} peers; see {page}",
+                  soft_wrap=True)
 
 
 def _flow(seeds):

@@ -147,7 +147,8 @@ def _place_all(subjects, seeds, jobs, progress, console):
             for future in as_completed(futures):
                 done += len(missing[future.result()])
                 if not console.is_terminal:
-                    console.print(f"{done} of {total} runs: {designs[future.result()].name}", markup=False)
+                    console.print(f"{done} of {total} runs: {designs[future.result()].name}", markup=False,
+                                  soft_wrap=True)
         except BaseException:
             stopped.set()
             raise
