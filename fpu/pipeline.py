@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 from amaranth.hdl import Signal
 
-__all__ = ["Pipeline", "balance", "carry_delay", "depth_for", "lut_delay", "product_delay"]
+__all__ = ["Pipeline", "balance", "carry_delay", "depth_for", "lut_delay"]
 
 
 # Of an ECP5 of speed grade 6, in ns, each with the routing before it.
@@ -56,11 +56,6 @@ def balance(weights, *, latency):
     registers = [int(step + 1 in ends) for step in range(len(weights))]
     registers[-1] += latency - num_stages
     return registers
-
-
-def product_delay(width):
-    """Delay in ns of a product of unsigned numbers: one multiplier block up to 18 bits, else several and their sum."""
-    return 4.5 if width <= 18 else 4.5 + carry_delay(2 * width)
 
 
 def depth_for(weights, *, stage_delay=_STAGE_DELAY):

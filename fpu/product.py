@@ -1,10 +1,18 @@
-"""Product of significands, in one multiplier block where there is one."""
+"""Products of unsigned numbers, in multiplier blocks where there are such."""
 
-from amaranth.hdl import ClockSignal, Const, Instance, Module, Signal
+from types import SimpleNamespace
+
+from amaranth.hdl import Cat, ClockSignal, Const, Instance, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-__all__ = ["Product"]
+from .chain import ChainBit, carry_chain
+from .pipeline import carry_delay
+
+__all__ = ["Product", "multiply_exactly", "product_delays"]
+
+_BLOCK_WIDTH = 18
+_BLOCK_DELAY = 4.5
 
 
 class Product(wiring.Component):
@@ -15,31 +23,29 @@ class Product(wiring.Component):
 
     Parameters
     ----------
-    width : int
-        Bits of an operand.
+    a_width, b_width : int
+        Bits of the operands.
     cycles : int
         Registers after the product.
 
     Members
     -------
-    a, b : In(width)
+    a : In(a_width)
+    b : In(b_width)
         Operands.
-    p : Out(2 * width)
+    p : Out(a_width + b_width)
         Product.
     """
 
-    _BLOCK_WIDTH = 18
-
-    def __init__(self, width, *, cycles):
-        self.width = width
+    def __init__(self, a_width, b_width, *, cycles):
         self.cycles = cycles
-        super().__init__({"a": In(width), "b": In(width), "p": Out(2 * width)})
+        super().__init__({"a": In(a_width), "b": In(b_width), "p": Out(a_width + b_width)})
 
     def elaborate(self, platform):
         m = Module()
         product, cycles = Signal.like(self.p), self.cycles
         is_ecp5 = getattr(platform, "device", "").startswith("LFE5")
-        if is_ecp5 and self.width <= self._BLOCK_WIDTH and cycles:
+        if is_ecp5 and max(len(self.a), len(self.b)) <= _BLOCK_WIDTH and cycles:
             m.submodules.block = self._block(product)
             cycles -= 1
         else:
@@ -54,10 +60,48 @@ class Product(wiring.Component):
     def _block(self, product):
         ports = {}
         for name, value in (("A", self.a), ("B", self.b), ("C", Const(0, 1))):
-            ports |= {f"i_{name}{bit}": value[bit] if bit < len(value) else Const(0)
-                      for bit in range(self._BLOCK_WIDTH)}
+            ports |= {f"i_{name}{bit}": value[bit] if bit < len(value) else Const(0) for bit in range(_BLOCK_WIDTH)}
         ports |= {f"o_P{bit}": product[bit] for bit in range(len(product))}
         return Instance(
             "MULT18X18D", p_REG_OUTPUT_CLK="CLK0", p_REG_OUTPUT_CE="CE0", p_REG_OUTPUT_RST="RST0",
             i_CLK0=ClockSignal(), i_CE0=Const(1), i_RST0=Const(0),
             i_SIGNEDA=Const(0), i_SIGNEDB=Const(0), i_SOURCEA=Const(0), i_SOURCEB=Const(0), **ports)
+
+
+def product_delays(name, a_width, b_width):
+    """Delays of the steps of :func:`multiply_exactly`."""
+    if max(a_width, b_width) <= _BLOCK_WIDTH:
+        return {name: _BLOCK_DELAY}
+    return {name: _BLOCK_DELAY, f"{name}_cross": carry_delay(max(a_width, b_width) + 1),
+            f"{name}_sum": carry_delay(a_width + b_width - _BLOCK_WIDTH)}
+
+
+def multiply_exactly(m, step, name, a, b, **carried):
+    """What is ``carried`` through the steps of :func:`product_delays`, and with it ``p`` = a * b.
+
+    One block for operands of up to 18 bits, up to four for up to 36.
+    """
+    a, b = Value.cast(a), Value.cast(b)
+    parts = [[value[:_BLOCK_WIDTH], value[_BLOCK_WIDTH:]] for value in (a, b)]
+    products = {}
+    for i, a_part in enumerate(parts[0]):
+        for j, b_part in enumerate(parts[1]):
+            if len(a_part) and len(b_part):
+                m.submodules[f"{name}_{i}{j}"] = product = Product(len(a_part), len(b_part), cycles=step.next_registers)
+                m.d.comb += [product.a.eq(a_part), product.b.eq(b_part)]
+                products[i, j] = product.p
+    s = step(name, **carried)
+    if len(products) == 1:
+        return SimpleNamespace(**vars(s), p=products[0, 0])
+    # The outer products stand side by side, the inner ones overlap both.
+    inner = [products.get(key, Const(0, 1)) for key in ((0, 1), (1, 0))]
+    width = max(map(len, inner)) + 1
+    inner = [Cat(value, Const(0, width - len(value))) for value in inner]
+    cross = carry_chain(m, f"{name}_cross", (ChainBit.ADD, *inner, 0))
+    outer = Cat(products[0, 0], products.get((1, 1), Const(0, 0)))
+    s = step(f"{name}_cross", s, outer=outer, cross=cross)
+    width = len(a) + len(b) - _BLOCK_WIDTH
+    upper = Cat(s.outer[_BLOCK_WIDTH:], Const(0, width))[:width]
+    upper = carry_chain(m, f"{name}_sum", (ChainBit.ADD, upper, Cat(s.cross, Const(0, width))[:width], 0))
+    s = step(f"{name}_sum", s, p=Cat(s.outer[:_BLOCK_WIDTH], upper))
+    return s

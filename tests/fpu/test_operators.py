@@ -138,7 +138,7 @@ def test_emulation(cls, rounding, fmt, pairs):
 def test_block_has_the_output_register(latency):
     """One multiplier block, with one register less outside it."""
     def flip_flops(platform):
-        text = rtlil.convert(Product(17, cycles=latency), platform=platform)
+        text = rtlil.convert(Product(17, 17, cycles=latency), platform=platform)
         return text.count("cell \\MULT18X18D"), text.count("cell $dff")
 
     assert flip_flops(None) == (0, latency)
@@ -146,7 +146,7 @@ def test_block_has_the_output_register(latency):
 
 
 def test_block_is_left_to_inference():
-    for product in (Product(17, cycles=0), Product(19, cycles=1)):
+    for product in (Product(17, 17, cycles=0), Product(19, 3, cycles=1)):
         assert "MULT18X18D" not in rtlil.convert(product, platform=ECP5())
 
 
