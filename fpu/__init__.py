@@ -9,8 +9,9 @@ from .divider import Divider
 from .format import FloatFormat
 from .multiplier import Multiplier
 from .rounding import Rounding
+from .square_root import SquareRoot
 
 __all__ = [
     "Adder", "Comparator", "Datapath", "Delay", "Divider", "FloatFormat", "FloatToInt", "IntToFloat", "Multiplier",
-    "Rounding", "Subtractor",
+    "Rounding", "SquareRoot", "Subtractor",
 ]

@@ -7,7 +7,7 @@ from amaranth.hdl import Cat, Const
 from .chain import ChainBit, carry_chain
 from .operator import BinaryOperator, is_inf, is_zero
 from .packing import round_and_pack, round_and_pack_delays
-from .pipeline import carry_delay
+from .pipeline import digit_delay
 from .rounding import Rounding, emulated, round_nearest, round_truncate
 
 __all__ = ["Divider", "divide", "divide_truncate"]
@@ -55,7 +55,7 @@ class Divider(BinaryOperator):
 
     @classmethod
     def _step_delays(cls, fmt):
-        return {f"digit_{bit}": carry_delay(fmt.sig_width + 1) for bit in _quotient_bits(fmt)} \
+        return {f"digit_{bit}": digit_delay(fmt.sig_width + 1) for bit in _quotient_bits(fmt)} \
             | round_and_pack_delays(fmt)
 
     def _compute(self, m, step):

@@ -4,13 +4,15 @@ from types import SimpleNamespace
 
 from amaranth.hdl import Signal
 
-__all__ = ["Pipeline", "balance", "carry_delay", "depth_for", "lut_delay"]
+__all__ = ["Pipeline", "balance", "carry_delay", "depth_for", "digit_delay", "lut_delay"]
 
 
 # Of an ECP5 of speed grade 6, in ns, each with the routing before it.
 _LUT_DELAY = 1.05
 _CARRY_ENTRY_DELAY = 2.0
 _CARRY_BIT_DELAY = 0.035
+#: One net to all places of a carry chain.
+_FAN_OUT_DELAY = 0.5
 #: What a clock of 175 MHz leaves to logic between two registers.
 _STAGE_DELAY = 5.2
 
@@ -23,6 +25,11 @@ def lut_delay(levels):
 def carry_delay(width):
     """Delay in ns of a carry chain, into it and out of it."""
     return _CARRY_ENTRY_DELAY + _CARRY_BIT_DELAY * width
+
+
+def digit_delay(width):
+    """Delay in ns of a digit of a recurrence: a carry chain whose last place decides what all of the next one do."""
+    return carry_delay(width) + _FAN_OUT_DELAY
 
 
 def balance(weights, *, latency):

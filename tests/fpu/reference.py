@@ -1,9 +1,10 @@
 """Floating-point operations on bit patterns, in exact fractions, after the specification of the formats."""
 
 from fractions import Fraction
-from math import copysign, inf, isinf
+from math import copysign, inf, isinf, isqrt
 
-__all__ = ["add", "divide", "multiply", "order", "pack", "subtract", "to_int", "unpack"]
+__all__ = ["add", "divide", "multiply", "order", "pack", "reciprocal",
+           "reciprocal_square_root", "square_root", "subtract", "to_int", "unpack"]
 
 
 def unpack(bits, exp_width, frac_width):
@@ -76,6 +77,39 @@ def divide(a, b, *fmt, truncate=False):
     if isinf(b):
         return pack(sign_a ^ sign_b, 0, *fmt)
     return pack(sign_a ^ sign_b, a / b, *fmt, truncate=truncate)
+
+
+def _root(radicand, frac_width):
+    """√radicand to more places than any rounding looks at, and one more if that is not exact."""
+    scale = 2 ** (frac_width + 60)
+    root = isqrt(radicand.numerator * radicand.denominator * scale ** 2)
+    exact = root ** 2 == radicand.numerator * radicand.denominator * scale ** 2
+    return Fraction(2 * root + (not exact), 2 * scale * radicand.denominator)
+
+
+def square_root(a, exp_width, frac_width, truncate=False):
+    sign, a = unpack(a, exp_width, frac_width)
+    if sign or a == 0:
+        return pack(sign if a == 0 else 0, 0, exp_width, frac_width)
+    if isinf(a):
+        return pack(0, inf, exp_width, frac_width)
+    return pack(0, _root(a, frac_width), exp_width, frac_width, truncate=truncate)
+
+
+def reciprocal(a, exp_width, frac_width, truncate=False):
+    sign, a = unpack(a, exp_width, frac_width)
+    if isinf(a) or a == 0:
+        return pack(sign, 0 if isinf(a) else inf, exp_width, frac_width)
+    return pack(sign, 1 / a, exp_width, frac_width, truncate=truncate)
+
+
+def reciprocal_square_root(a, exp_width, frac_width, truncate=False):
+    sign, a = unpack(a, exp_width, frac_width)
+    if a == 0:
+        return pack(sign, inf, exp_width, frac_width)
+    if sign or isinf(a):
+        return 0
+    return pack(0, _root(1 / a, frac_width), exp_width, frac_width, truncate=truncate)
 
 
 def order(a, b, *fmt):
