@@ -8,10 +8,11 @@ from .delay import Delay
 from .divider import Divider
 from .format import FloatFormat
 from .multiplier import Multiplier
+from .reciprocal import Reciprocal, TableDivider
 from .rounding import Rounding
 from .square_root import SquareRoot
 
 __all__ = [
     "Adder", "Comparator", "Datapath", "Delay", "Divider", "FloatFormat", "FloatToInt", "IntToFloat", "Multiplier",
-    "Rounding", "SquareRoot", "Subtractor",
+    "Reciprocal", "Rounding", "SquareRoot", "Subtractor", "TableDivider",
 ]

@@ -95,10 +95,9 @@ class Pipeline:
         self._m = m
         self._remaining = list(zip(weights, balance(list(weights.values()), latency=latency), strict=True))
 
-    @property
-    def next_registers(self):
-        """Registers that follow the next step to be ended, for a step that brings its own."""
-        return self._remaining[0][1]
+    def registers_of_next(self, count):
+        """Registers behind the next ``count`` steps to be ended, for what brings its own."""
+        return sum(registers for _, registers in self._remaining[:count])
 
     def __call__(self, name, carried=None, /, **results):
         """End the step ``name``: its ``results``, and what is ``carried`` from before, as attributes."""

@@ -87,7 +87,8 @@ def multiply_exactly(m, step, name, a, b, **carried):
     for i, a_part in enumerate(parts[0]):
         for j, b_part in enumerate(parts[1]):
             if len(a_part) and len(b_part):
-                m.submodules[f"{name}_{i}{j}"] = product = Product(len(a_part), len(b_part), cycles=step.next_registers)
+                m.submodules[f"{name}_{i}{j}"] = product = Product(len(a_part), len(b_part),
+                                                                cycles=step.registers_of_next(1))
                 m.d.comb += [product.a.eq(a_part), product.b.eq(b_part)]
                 products[i, j] = product.p
     s = step(name, **carried)

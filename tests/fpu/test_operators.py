@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from amaranth.back import rtlil
 
-from fpu import Adder, Comparator, Divider, FloatFormat, Multiplier, Rounding, Subtractor
+from fpu import Adder, Comparator, Divider, FloatFormat, Multiplier, Rounding, Subtractor, TableDivider
 from fpu.product import Product
 from tests.fpu import ECP5, reference
 from tests.fpu.verilated import Bank
@@ -13,7 +13,7 @@ TINY, TINIEST = FloatFormat(3, 2), FloatFormat(2, 3)
 DEFAULT = FloatFormat(7, 16)
 NUMPY = {FloatFormat(5, 10): np.float16, FloatFormat(8, 23): np.float32}
 EXACT = {Adder: reference.add, Subtractor: reference.subtract, Multiplier: reference.multiply,
-         Divider: reference.divide}
+         Divider: reference.divide, TableDivider: reference.divide}
 # One more than the steps there are to put registers behind
 MAX_LATENCY = {Adder: 11, Multiplier: 5, Divider: 9, Comparator: 4}
 
