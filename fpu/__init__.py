@@ -9,10 +9,11 @@ from .divider import Divider
 from .format import FloatFormat
 from .multiplier import Multiplier
 from .reciprocal import Reciprocal, TableDivider
+from .reciprocal_square_root import ReciprocalSquareRoot
 from .rounding import Rounding
 from .square_root import SquareRoot
 
 __all__ = [
     "Adder", "Comparator", "Datapath", "Delay", "Divider", "FloatFormat", "FloatToInt", "IntToFloat", "Multiplier",
-    "Reciprocal", "Rounding", "SquareRoot", "Subtractor", "TableDivider",
+    "Reciprocal", "ReciprocalSquareRoot", "Rounding", "SquareRoot", "Subtractor", "TableDivider",
 ]

@@ -87,7 +87,7 @@ class Reciprocal(UnaryOperator):
     @classmethod
     def _step_delays(cls, fmt):
         return {**cls._table(fmt).delays("estimate"), **product_delays("check", fmt.sig_width + 1, fmt.sig_width),
-                **round_and_pack_delays(fmt)}
+                "side": lut_delay(2), **round_and_pack_delays(fmt)}
 
     def _compute(self, m, step):
         fmt, a, table = self.fmt, self.a, self._table(self.fmt)
@@ -98,10 +98,11 @@ class Reciprocal(UnaryOperator):
         s = multiply_exactly(m, step, "check", Cat(Const(1, 1), estimate), Cat(s.frac, Const(1, 1)), estimate=estimate,
                              exp=s.exp, sign=s.sign, zero=s.zero, inf=s.inf)
         # Below 1, the product says that 1 / a is above. That goes in as the guard bit: it cannot be in the middle.
-        above = ~s.p[2 * fmt.frac_width + 2]
+        s = step("side", above=~s.p[2 * fmt.frac_width + 2],
+                 **{name: getattr(s, name) for name in ("estimate", "exp", "sign", "zero", "inf")})
         exp = carry_chain(m, "exponent", (ChainBit.CARRY, Const(1, 1), 0, 0),
                           (ChainBit.SUBTRACT, Const(2 * fmt.bias - 1, fmt.exp_width + 2), Cat(s.exp, Const(0, 2)), 0))
-        s = SimpleNamespace(sig=Cat(above, s.estimate, Const(0, 1)), sticky=Const(1, 1), exp=exp[1:].as_signed(),
+        s = SimpleNamespace(sig=Cat(s.above, s.estimate, Const(0, 1)), sticky=Const(1, 1), exp=exp[1:].as_signed(),
                             sign=s.sign, zero=s.zero, inf=s.inf)
         m.d.comb += self.r.eq(round_and_pack(step, m, s, fmt=fmt, rounding=self.rounding))
 

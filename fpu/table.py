@@ -69,7 +69,7 @@ class LineTable:
         return delays
 
     def look_up(self, m, step, name, line, offset, **carried):
-        """What is ``carried`` through the steps, and with it as ``value`` the result at point ``offset`` of ``line``."""
+        """What is ``carried`` through the steps, and as ``value`` the result at point ``offset`` of ``line``."""
         m.submodules[name] = rom = Rom(self._words, width=self.value_width + self._slope_width,
                                        cycles=step.registers_of_next(len(_READ_DELAYS)))
         m.d.comb += rom.address.eq(line)
