@@ -78,9 +78,9 @@ class ReciprocalSquareRoot(UnaryOperator):
     @classmethod
     def _step_delays(cls, fmt):
         width = fmt.sig_width + 1
-        return {**_roots(fmt.frac_width).delays("estimate"), **product_delays("square", width, width),
-                **product_delays("check", width, width), "sum": carry_delay(2 * width) + lut_delay(1), "side": lut_delay(2),
-                **round_and_pack_delays(fmt)}
+        return {**_roots(fmt.frac_width).delays("estimate"), **product_delays("square", width, width), "move": lut_delay(2),
+                **product_delays("check", width, width), "sum": carry_delay(2 * width) + lut_delay(1),
+                "side": lut_delay(2), **round_and_pack_delays(fmt)}
 
     def _compute(self, m, step):
         fmt, a, table = self.fmt, self.a, _roots(self.fmt.frac_width)
@@ -98,6 +98,8 @@ class ReciprocalSquareRoot(UnaryOperator):
         rest = {name: getattr(s, name) for name in ("exp", "sign", "zero", "inf")}
         s = multiply_exactly(m, step, "square", half_way, half_way, estimate=estimate,
                              radicand=s.radicand, **rest)
+        # From one multiplier block to the next takes all of a clock.
+        s = step("move", s)
         lower, upper = s.p[:fmt.sig_width + 1], s.p[fmt.sig_width + 1:]
         m.submodules.check_lower = below = Product(len(lower), len(s.radicand), cycles=step.registers_of_next(1))
         m.d.comb += [below.a.eq(lower), below.b.eq(s.radicand)]
