@@ -78,7 +78,8 @@ class ReciprocalSquareRoot(UnaryOperator):
     @classmethod
     def _step_delays(cls, fmt):
         width = fmt.sig_width + 1
-        return {**_roots(fmt.frac_width).delays("estimate"), **product_delays("square", width, width), "move": lut_delay(2),
+        return {**_roots(fmt.frac_width).delays("estimate"),
+                **product_delays("square", width, width), "move": lut_delay(2),
                 **product_delays("check", width, width), "sum": carry_delay(2 * width) + lut_delay(1),
                 "side": lut_delay(2), **round_and_pack_delays(fmt)}
 
