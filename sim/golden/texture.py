@@ -43,12 +43,12 @@ def sample(texels, layout, decoded, s, t):
     if not (math.isfinite(s) and math.isfinite(t)):
         s = t = 0.0
     # Whole repeats are taken off first, so that indices of far-out coordinates fit.
-    x, y = (s - math.floor(s)) * width, (t - math.floor(t)) * height
+    x, y = (s - np.floor(s)) * width, (t - np.floor(t)) * height
     if not layout[3]:
         texel = texels[base + min(int(y), height - 1) * width + min(int(x), width - 1)]
         return decoded[texel[0]], decoded[texel[1]], decoded[texel[2]], texel[3] / 255.0
     x, y = x - 0.5, y - 0.5
-    i, j = math.floor(x), math.floor(y)
+    i, j = np.floor(x), np.floor(y)
     left, upper = int(i) % width, int(j) % height
     right, lower = (left + 1) % width, (upper + 1) % height
     corners = (base + upper * width + left, base + upper * width + right, base + lower * width + left,
@@ -77,7 +77,7 @@ def sky_color(texels, size, decoded, direction):
     if z < 0.0:
         p, q = (1.0 - abs(q)) * (-1.0 if p < 0.0 else 1.0), (1.0 - abs(p)) * (-1.0 if q < 0.0 else 1.0)
     x, y = (p + 1.0) / 2.0 * size - 0.5, (q + 1.0) / 2.0 * size - 0.5
-    i, j = math.floor(x), math.floor(y)
+    i, j = np.floor(x), np.floor(y)
     a, b = int(i), int(j)
     corners = (_folded(a, b, size), _folded(a + 1, b, size), _folded(a, b + 1, size), _folded(a + 1, b + 1, size))
     red, green, blue, _ = _mixed(texels, decoded, corners, x - i, y - j)
