@@ -63,7 +63,7 @@ def _mesh_stops(origin, direction, t_far, instance, excluded, geometry, surfaces
 
 @compiled()
 def _stops(origin, direction, t_far, excluded, geometry, surfaces, looks, memory):
-    """_SOLID if something solid is in the way, _CLEAR if there are but things that the shader must look at, or _OPEN."""
+    """_SOLID if something solid is in the way, _CLEAR if only things that the shader must look at are, or _OPEN."""
     stack, mesh_stack, inverse, mesh_inverse, mesh_origin, mesh_direction = memory
     lower, upper, first, count, items = geometry.top
     for k in range(3):

@@ -58,7 +58,7 @@ def test_refraction_obeys_snell(direction, normal, eta):
     assert bent @ normal < 0
     assert np.linalg.norm(bent) == pytest.approx(np.linalg.norm(direction), rel=1e-9)
     # In the plane of incidence, and on along the surface, not back.
-    assert np.linalg.det(np.array([direction, normal, bent])) == pytest.approx(0, abs=1e-9)
+    assert np.cross(direction, normal) @ bent == pytest.approx(0, abs=1e-9)
     assert (bent - (bent @ normal) * normal) @ direction >= -1e-12
 
 
