@@ -57,7 +57,8 @@ def furnished_room():
     normals = np.where(round_things[:, None, None], smooth_normals(mesh.vertices, triangles, crease_deg=60), 0.0)
     looks = _looks()
     materials = [replace(material, **looks.get(material.name, {})) for material in room.materials]
-    return Mesh("room", mesh.vertices, triangles, material_ids, normals=normals, uvs=box_uvs(corners, size=1.2)), materials
+    uvs = box_uvs(corners, size=1.2)
+    return Mesh("room", mesh.vertices, triangles, material_ids, normals=normals, uvs=uvs), materials
 
 
 def mirror_room_scene():
@@ -84,7 +85,8 @@ def mirror_room_scene():
     places = ((0, 0, 0), (0, 0, 0), (2.62, 2.42, 0.7415 + 0.17), (2.15, 2.55, 0.7415 + 0.12), (2.5, 3.0, 1.87))
     instances = [Instance(number, np.column_stack([np.eye(3), place]), mesh.name)
                  for number, (mesh, place) in enumerate(zip(meshes, places, strict=True))]
-    lights = [Light("point", color=(1.0, 0.80, 0.55), intensity=0.9, position=(2.5, 3.0, 1.80), radius=0.15, name="lamp"),
+    lights = [Light("point", color=(1.0, 0.80, 0.55), intensity=0.9, position=(2.5, 3.0, 1.80), radius=0.15,
+                    name="lamp"),
               Light("directional", color=(1.0, 0.93, 0.80), intensity=2.8, direction=SUN, name="sun")]
     sky = Sky.gradient(zenith=(0.12, 0.28, 0.68), horizon=(0.62, 0.78, 0.92), ground=(0.12, 0.16, 0.07), sun=-SUN)
     camera = Camera((4.55, 0.55, 1.70), (1.45, 3.75, 0.95), (0.0, 0.0, 1.0), 68.0, "corner")

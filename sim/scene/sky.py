@@ -77,7 +77,7 @@ class Sky:
         return cls.of(color, size=size)
 
     @classmethod
-    def gradient(cls, *, zenith, horizon, ground, up=(0.0, 0.0, 1.0), sun=None, sun_color=(1.0, 0.95, 0.8), size=256):
+    def gradient(cls, *, zenith, horizon, ground, up=(0.0, 0.0, 1.0), sun=None, sun_color=(1.0, 0.95, 0.8), size=512):
         """Clear sky: linear RGB at the zenith, the horizon and below it, and a glow round the direction of the sun."""
         up = np.asarray(up, np.float64) / np.linalg.norm(up)
         zenith, horizon, ground = (np.asarray(color, np.float64) for color in (zenith, horizon, ground))
@@ -85,7 +85,7 @@ class Sky:
         def color(directions):
             height = (directions @ up)[..., None]
             above = horizon + (zenith - horizon) * np.clip(height, 0, 1) ** 0.5
-            result = np.where(height >= 0, above, ground + (horizon - ground) * np.exp(20 * np.minimum(height, 0)))
+            result = np.where(height >= 0, above, ground + (horizon - ground) * np.exp(60 * np.minimum(height, 0)))
             if sun is not None:
                 towards = np.clip(directions @ (np.asarray(sun) / np.linalg.norm(sun)), 0, 1)[..., None]
                 result = result + np.asarray(sun_color) * (0.35 * towards**16 + 2.0 * towards**1024)
