@@ -12,11 +12,12 @@ from .ply import load_ply
 from .room import room_scene
 from .sunflowers import sunflowers_scene
 from .vpl import vpl_scene
+from .walk import walk_scene
 
 __all__ = ["BUILT_IN", "load_scene"]
 
 #: Scenes made in code, by name.
-BUILT_IN = {"room": room_scene, "mirror-room": mirror_room_scene, "vpl": vpl_scene,
+BUILT_IN = {"room": room_scene, "mirror-room": mirror_room_scene, "vpl": vpl_scene, "walk": walk_scene,
             "sunflowers": sunflowers_scene}
 
 _LOADERS = {".obj": load_obj, ".ply": load_ply, ".ply.gz": load_ply, ".gltf": load_gltf, ".glb": load_gltf}

@@ -38,7 +38,7 @@ def _times(outer, inner):
 
 
 def _blade(length, width, *, droop, fold, num_along, num_across, tip=1.0):
-    """Leaf or petal from the origin along +x: width · (sin πu)^tip across, hanging down by droop·u², folded along its middle."""
+    """Leaf or petal from the origin along +x: width·(sin πu)^tip across, hanging by droop·u², folded in its middle."""
     def surface(u, v):
         half = width / 2 * np.sin(np.pi * np.clip(u, 0.02, 0.985)) ** tip * (1 - 0.25 * u)
         side = 2 * v - 1
@@ -56,7 +56,8 @@ def _disc(radius, height, rows, *, upwards):
 
 def _head():
     """The flower's head facing +z, with its middle at the origin: (shape, material) pairs."""
-    parts = [(_disc(_HEAD_RADIUS, 0.022, 8, upwards=True), _DISC), (_disc(_HEAD_RADIUS, -0.05, 8, upwards=False), _STALK)]
+    parts = [(_disc(_HEAD_RADIUS, 0.022, 8, upwards=True), _DISC),
+             (_disc(_HEAD_RADIUS, -0.05, 8, upwards=False), _STALK)]
     floret = lathe([(1.0, 0.0), (0.95, 1.6), (0.12, 2.2)], 6)
     for k in range(1038):
         distance = math.sqrt((k + 0.5) / 1038)
@@ -109,7 +110,8 @@ def _materials():
     gold = blend(along**0.7, (0.82, 0.30, 0.004), (0.95, 0.60, 0.015)) * (0.75 + 0.25 * petal[..., None])
     return [Material("stalk", (0.20, 0.36, 0.08), specular=0.05, shininess=8),
             Material("leaf", (1.0, 1.0, 1.0), specular=0.12, shininess=16,
-                     texture=texture("leaf", blend(0.7 * leaf + 0.3 * veins**8, (0.05, 0.17, 0.025), (0.19, 0.40, 0.08)))),
+                     texture=texture("leaf", blend(0.7 * leaf + 0.3 * veins**8, (0.05, 0.17, 0.025),
+                                                   (0.19, 0.40, 0.08)))),
             Material("petal", (1.0, 1.0, 1.0), texture=texture("petal", gold)),
             Material("disc", (0.17, 0.075, 0.02), specular=0.1, shininess=16),
             Material("bud", (0.24, 0.20, 0.04), specular=0.1, shininess=16)]

@@ -21,8 +21,9 @@ __all__ = ["NUM_LIGHTS", "vpl_scene"]
 NUM_LIGHTS = 200
 # The window's opening, in the plane y = 6.2 outside of the wall: lower corner and size.
 _CORNER, _SIZE = np.array((1.5, 6.19, 0.9)), np.array((2.0, 1.3))
-_SUNLIGHT, _SKYLIGHT = np.array((1.0, 0.86, 0.64)) * 7.0, np.array((0.62, 0.80, 1.0)) * 3.0
-# Of 200: patches of the window itself, paths of sunlight, paths of skylight; each path gives a lamp, every other one two.
+_SUNLIGHT, _SKYLIGHT = np.array((1.0, 0.86, 0.64)) * 9.0, np.array((0.62, 0.80, 1.0)) * 5.0
+# Of 200: patches of the window itself, and paths of sunlight and skylight, which give a lamp where they end first; the
+# rest are second bounces.
 _NUM_PATCHES, _NUM_SUN, _NUM_SKY = 32, 72, 40
 
 
@@ -85,14 +86,15 @@ def _bounce(mesh, albedo, origins, directions, strength):
 def _albedo(materials):
     """Mean colour of each material, textures included, float64[M, 3]."""
     return np.array([np.array(material.base_color) * (
-        decode(material.texture.pixels[..., :3]).mean(axis=(0, 1)) if material.texture else 1.0) for material in materials])
+        decode(material.texture.pixels[..., :3]).mean(axis=(0, 1)) if material.texture else 1.0)
+        for material in materials])
 
 
 def vpl_lights(mesh, materials):
     """The 200 lights.
 
-    A white surface shows 1/π of the light that falls on it, so a piece of window with radiance L, area A becomes intensity
-    L·A/π, and a lamp where one of n paths of sunlight or skylight ends ρ/n times what came in by all of them.
+    A white surface shows 1/π of the light that falls on it, so a piece of window with radiance L and area A becomes
+    intensity L·A/π, and the end of one of n paths ρ/n times what came in by all of them.
     """
     albedo, area = _albedo(materials), float(np.prod(_SIZE))
     inwards = np.tile((0.0, -1, 0), (_NUM_SKY, 1))
@@ -123,5 +125,5 @@ def vpl_scene():
     sky = Sky.gradient(zenith=(0.30, 0.50, 0.85), horizon=(0.85, 0.95, 1.0), ground=(0.35, 0.42, 0.25), sun=-SUN)
     sun = Light("directional", color=tuple((_SUNLIGHT / math.pi).tolist()), direction=SUN, name="sun")
     camera = Camera((4.55, 0.55, 1.70), (1.45, 3.75, 0.95), (0.0, 0.0, 1.0), 68.0, "corner")
-    return Scene([mesh], [Instance(0, IDENTITY, "room")], materials, [camera], lights=[sun, *vpl_lights(mesh, materials)],
-                 sky=sky)
+    lights = [sun, *vpl_lights(mesh, materials)]
+    return Scene([mesh], [Instance(0, IDENTITY, "room")], materials, [camera], lights=lights, sky=sky)
