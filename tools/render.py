@@ -4,6 +4,7 @@ import contextlib
 import json
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -15,8 +16,9 @@ from fpu import FloatFormat
 from sim.golden import MAX_DEPTH, SHADINGS, psnr, render_golden
 from sim.machine import render_pysim, render_rtl
 from sim.model import render_model
-from sim.scene import load_scene
+from sim.scene import Sky, load_scene
 from sim.scene.compile import CompiledScene
+from sim.scene.texture import decode_texture
 
 from .errors import BadInput, clear_errors, written_whole
 from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, chip_config
@@ -45,6 +47,8 @@ _CHECKED_PIXELS = 1 << 21
               "times cosine; full: lights, shadows, textures, reflection, refraction (with --engine golden)")
 @click.option("--depth", type=click.IntRange(0, MAX_DEPTH), help="Generations of secondary rays of full shading  "
               "[default: 4]")
+@click.option("--sky", type=click.Path(dir_okay=False, path_type=Path), help="Panorama (equirectangular picture) "
+              "round the scene, for full shading  [default: the scene's own, else the background]")
 @click.option("--background", type=click.IntRange(0, 255), nargs=3, default=(0, 0, 0), show_default=True,
               metavar="R G B")
 @click.option("--flatten/--instances", default=None, help="Put all triangles into one space, or transform rays into "
@@ -62,12 +66,12 @@ _CHECKED_PIXELS = 1 << 21
               "prim_id, t, u, v of each pixel")
 @click.option("--report", type=click.Path(dir_okay=False, path_type=Path), help="JSON to write")
 @click.option("--check/--no-check", default=True, help="Compare with the model and with golden")
-def render(scene, output, engine, size, fmt, camera, view, frames, shading, depth, background, flatten, parameters,
-           latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
+def render(scene, output, engine, size, fmt, camera, view, frames, shading, depth, sky, background, flatten,
+           parameters, latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
     """Draw SCENE: an .obj, .ply, .ply.gz, .gltf or .glb file, or a built-in one: room, mirror-room, vpl, walk or
     sunflowers."""
     config = chip_config(fmt, parameters)
-    _check_shading(engine, shading, depth)
+    _check_shading(engine, shading, depth, sky)
     _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames, hits)
     output = output or Path(f"{Path(scene).name.split('.')[0]}.png")
     for path in (output, wave, hits, report):
@@ -77,6 +81,8 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
     with clear_errors(), contextlib.ExitStack() as files:
         loaded = load_scene(scene)
         chosen = _camera(loaded, camera, view)
+        if sky is not None:
+            loaded = replace(loaded, sky=_panorama(sky, chosen))
         if frames and not loaded.is_animated:
             raise BadInput(f"{scene}: nothing moves in this scene; leave --frames out")
         compiled = None
@@ -117,11 +123,13 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
                 path.write_text(json.dumps(reports if frames else reports[0], indent=1) + "\n")
 
 
-def _check_shading(engine, shading, depth):
+def _check_shading(engine, shading, depth, sky):
     if shading == "full" and engine != "golden":
         raise click.UsageError(f"--shading full: the engine {engine} has the simple shader only; use --engine golden")
     if depth is not None and shading != "full":
         raise click.UsageError("--depth is of full shading; use --shading full")
+    if sky is not None and shading != "full":
+        raise click.UsageError("--sky is of full shading; use --shading full")
 
 
 def _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames, hits):
@@ -157,6 +165,16 @@ def _camera(scene, camera, view):
         have = f"cameras 0 to {len(scene.cameras) - 1}" if scene.cameras else "no cameras; use --camera"
         raise BadInput(f"--view: there is no camera {view}, the scene has {have}")
     return scene.cameras[view]
+
+
+def _panorama(path, camera):
+    """The sky in a file, its upper edge at the world's axis nearest to the camera's up."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise BadInput(f"--sky: {path}: {error.strerror}") from error
+    up = np.eye(3)[np.abs(camera.up).argmax()] * np.sign(camera.up[np.abs(camera.up).argmax()])
+    return Sky.from_panorama(decode_texture(data, str(path), []).pixels, up=up)
 
 
 @contextlib.contextmanager

@@ -80,7 +80,8 @@ def halls(numbers):
                     (-1, 0, (x, y + CELL), (CELL, 0)), (1, 0, (x + CELL, y), (-CELL, 0)),
                     (0, -1, (x, y), (0, CELL)), (0, 1, (x + CELL, y + CELL), (0, -CELL))):
                 if not _is_open(row + step_row, column + step_column):
-                    start, along, inwards = np.array((*corner, 0.0)), (*run, 0.0), np.array((run[1], -run[0], 0.0)) / CELL
+                    start, along = np.array((*corner, 0.0)), (*run, 0.0)
+                    inwards = np.array((run[1], -run[0], 0.0)) / CELL
                     parts += [(sheet(start, along, (0, 0, HEIGHT), repeats=(1, HEIGHT / CELL)), numbers["brick"]),
                               (sheet(start + 0.02 * inwards, along, (0, 0, 0.25)), numbers["trim"])]
     for x, y in _PILLARS:

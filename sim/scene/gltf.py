@@ -19,6 +19,7 @@ __all__ = ["load_gltf"]
 
 _MODES = ("points", "lines", "line loop", "line strip", "triangles", "triangle strip", "triangle fan")
 _PATHS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
+_NOT_DRAWN = {"COLOR_0": "vertex colours (COLOR_0)", "JOINTS_0": "skins (JOINTS_0)", "targets": "morph targets"}
 # glTF leaves the picture's shape to the viewer: where a camera gives none, ours is that of the default
 # picture.
 _DEFAULT_ASPECT = 4 / 3
@@ -48,6 +49,11 @@ def _primitive(primitive, accessors, warnings):
     if attributes is None or "POSITION" not in attributes.data:
         warnings.append(f"{primitive.place}: has no POSITION; left out")
         return None
+
+    for key, what in _NOT_DRAWN.items():
+        text = f"{what} cannot be drawn; left out"
+        if (key in attributes.data or key in primitive.data) and text not in warnings:
+            warnings.append(text)
 
     def attribute(key, kind):
         if key not in attributes.data:

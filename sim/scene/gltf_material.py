@@ -3,7 +3,7 @@
 from .accessors import read_uri
 from .error import SceneError
 from .material import Material
-from .texture import decode_texture
+from .texture import decode_texture, resampling_warning
 
 __all__ = ["MATERIAL_EXTENSIONS", "GltfMaterials"]
 
@@ -34,7 +34,7 @@ class GltfMaterials:
 
     def __init__(self, root, accessors, folder, warnings):
         self._root, self._accessors, self._folder, self._warnings = root, accessors, folder, warnings
-        self._images, self._odd = {}, {}
+        self._images, self._odd, self._resampled = {}, {}, []
 
     def load(self):
         """All materials of the file, in file order.
@@ -48,6 +48,7 @@ class GltfMaterials:
         for what, places in self._odd.items():
             more = f" and {len(places) - 1} more" if len(places) > 1 else ""
             self._warnings.append(f"{places[0]}{more}: {what} cannot be drawn; left out")
+        self._warnings.extend(resampling_warning(self._resampled))
         return materials
 
     def _note(self, element, what):
@@ -117,7 +118,8 @@ class GltfMaterials:
             return None
         if reference.whole("texCoord", 0):
             self._note(reference, "a second set of texture coordinates")
-        for key in reference.data.get("extensions") or ():
+        extensions = reference.child("extensions")
+        for key in extensions.data if extensions else ():
             self._note(reference, f"extension {key}")
         texture = reference.refer("index", "textures")
         if "source" not in texture.data:
@@ -142,6 +144,6 @@ class GltfMaterials:
             data = read_uri(image, uri, self._folder)
         try:
             return decode_texture(data, image.text("name", uri if uri and len(uri) < 80 else image.place),
-                                  self._warnings, filtered=filtered)
+                                  self._resampled, filtered=filtered)
         except SceneError as error:
             raise image.error(error) from None

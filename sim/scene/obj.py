@@ -170,6 +170,7 @@ def load_obj(path):
     textures = TextureFiles(path.parent, warnings, flip=True)
     for name in text.names(b"mtllib")[1]:
         materials += load_mtl(path.parent, name, textures, warnings)
+    warnings += textures.warnings()
     number = {material.name: i for i, material in reversed(list(enumerate(materials)))}
     use_rows, use_names = text.names(b"usemtl")
     for name in dict.fromkeys(use_names):

@@ -10,7 +10,7 @@ from PIL import Image
 from .error import SceneError
 from .files import inside
 
-__all__ = ["MAX_SIDE", "Texture", "TextureFiles", "decode_texture"]
+__all__ = ["MAX_SIDE", "Texture", "TextureFiles", "decode_texture", "resampling_warning"]
 
 #: Texels a side that the shader addresses.
 MAX_SIDE = 4096
@@ -84,7 +84,15 @@ class Texture:
         return replace(self, pixels=np.concatenate([color[..., :3], alpha[..., None]], axis=-1))
 
 
-def decode_texture(data, name, warnings, *, flip=False, filtered=True):
+def resampling_warning(resampled):
+    """List of the one sentence about all pictures that were resampled, from their descriptions; empty if none was."""
+    if not resampled:
+        return []
+    shown = ", ".join(resampled[:4]) + (f" and {len(resampled) - 4} more" if len(resampled) > 4 else "")
+    return [f"textures resampled, as sides are powers of two up to {MAX_SIDE}: {shown}"]
+
+
+def decode_texture(data, name, resampled, *, flip=False, filtered=True):
     """Texture from the bytes of an image file.
 
     Parameters
@@ -92,8 +100,8 @@ def decode_texture(data, name, warnings, *, flip=False, filtered=True):
     data : bytes
     name : str
         What messages call it.
-    warnings : list of str
-        Receives a sentence if the picture is resampled to sides that are powers of two.
+    resampled : list of str
+        Receives a description if the picture is resampled to sides that are powers of two.
     flip : bool
         Make the last row the one at v = 0, for formats whose v runs upwards.
     filtered : bool
@@ -110,21 +118,19 @@ def decode_texture(data, name, warnings, *, flip=False, filtered=True):
             image = Image.open(io.BytesIO(data), formats=_FORMATS)
             width, height = image.size
             if width * height > _MAX_PIXELS:
-                raise SceneError(f"texture '{name}': {width}x{height} pixels are too many; at most "
-                                 f"{_MAX_PIXELS:,} are read")
+                raise Image.DecompressionBombError
             if image.mode.startswith("I"):
                 image = Image.fromarray((np.asarray(image).astype(np.int64).clip(0, 65535) >> 8).astype(np.uint8))
             image = image.convert("RGBA")
-    except SceneError:
-        raise
+    except Image.DecompressionBombError:
+        raise SceneError(f"texture '{name}': too many pixels; at most {_MAX_PIXELS:,} are read") from None
     # Decoders of damaged files raise whatever they stumble over.
     except Exception as error:
         text = "not a picture of a known format" if isinstance(error, Image.UnidentifiedImageError) else error
         raise SceneError(f"texture '{name}': cannot be read: {text}") from None
     size = tuple(min(_power_of_two(side), MAX_SIDE) for side in image.size)
     if size != image.size:
-        warnings.append(f"texture '{name}': {width}x{height} resampled to {size[0]}x{size[1]}; sides are powers of two "
-                        f"up to {MAX_SIDE}")
+        resampled.append(f"{name} from {width}x{height} to {size[0]}x{size[1]}")
         image = image.resize(size, Image.Resampling.LANCZOS)
     if flip:
         image = image.transpose(Image.Transpose.FLIP_TOP_BOTTOM)
@@ -139,14 +145,18 @@ class TextureFiles:
     folder : Path
         The scene's folder; images may not lie outside.
     warnings : list of str
-        Receives a sentence for each file that is missing or resampled.
+        Receives a sentence for each file that is missing.
     flip : bool
         See :func:`decode_texture`.
     """
 
     def __init__(self, folder, warnings, *, flip):
         self._folder, self._warnings, self._flip = folder, warnings, flip
-        self._textures = {}
+        self._textures, self._resampled = {}, []
+
+    def warnings(self):
+        """What is to be said when all are read."""
+        return resampling_warning(self._resampled)
 
     def load(self, name):
         """The texture in a file, or None (and a warning) if there is no such file.
@@ -164,5 +174,5 @@ class TextureFiles:
                 self._warnings.append(f"texture '{name}': {error.strerror or error}; drawn without it")
                 self._textures[name] = None
                 return None
-            self._textures[name] = decode_texture(data, name, self._warnings, flip=self._flip)
+            self._textures[name] = decode_texture(data, name, self._resampled, flip=self._flip)
         return self._textures[name]

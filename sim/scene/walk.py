@@ -154,7 +154,7 @@ def walk_scene():
     stage.carry(3, slide, "gate")
     _shots(stage, 4)
     for number, (x, y) in enumerate(LAMPS):
-        lamp = Light("point", color=(1.0, 0.86, 0.66), intensity=3.4 if y > 8 else 2.2, radius=0.5, reach=12.0,
+        lamp = Light("point", color=(1.0, 0.86, 0.66), intensity=5.5 if y > 8 else 2.8, radius=0.5, reach=12.0,
                      name=f"lamp {number}")
         stage.lights.append(LightNode(stage.node((x, y, HEIGHT - 0.25)), lamp))
     gallery = stage.node((16.3, 12.7, 2.3), rotation=_facing(np.array([(6.0, 0.5, -0.9)]))[0])
@@ -166,4 +166,4 @@ def walk_scene():
     world = pose_nodes(stage.nodes, order, stage.channels, 0.0)
     instances = [Instance(mesh, world[node][:3], name) for mesh, node, name in stage.instances]
     return Scene(meshes, instances, looks, [camera.camera(world) for camera in stage.cameras], animation,
-                 lights=[light.light(world) for light in stage.lights], ambient=(0.055, 0.06, 0.075))
+                 lights=[light.light(world) for light in stage.lights], ambient=(0.08, 0.085, 0.10))

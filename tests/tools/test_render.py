@@ -102,7 +102,7 @@ def test_missing_file(tmp_path):
 def test_unknown_format(tmp_path):
     fails(tmp_path, obj(tmp_path, "", "scene.stl"),
           says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb and the "
-               "built-in scene 'room'")
+               "built-in scenes room, mirror-room, vpl, walk, sunflowers")
 
 
 def gltf(tmp_path, *, uri="data.bin", matrix=None, byte_length=36, data=None):
