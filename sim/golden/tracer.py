@@ -46,7 +46,7 @@ class Hits:
 
     def reshape(self, *shape):
         """The same hits in another shape."""
-        return Hits(*(getattr(self, field.name).reshape(*shape) for field in fields(self)))
+        return Hits(*(getattr(self, field.name).reshape(shape) for field in fields(self)))
 
 
 def _mesh_bvh(mesh):
