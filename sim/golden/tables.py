@@ -135,6 +135,7 @@ def surfaces(scene):
 
     all_normals, normal_starts = joined(normals, 3, 3)
     uvs, uv_starts = joined([mesh.uvs for mesh in scene.meshes], 3, 2)
+    uvs[~np.isfinite(uvs)] = 0.0
     mesh_of = np.array([instance.mesh for instance in scene.instances])
     return Surfaces(np.concatenate([mesh.material_ids for mesh in scene.meshes]).astype(np.int32), all_normals, uvs,
                     np.stack([normal_starts[mesh_of], uv_starts[mesh_of]], axis=1).astype(np.int64))
