@@ -12,6 +12,9 @@ __all__ = ["MAX_DEPTH", "shade_full"]
 #: Generations of secondary rays that can be asked for.
 MAX_DEPTH = 16
 
+# Light from everywhere in scenes that have no lights of their own.
+_HEADLIGHTS_AMBIENT = 0.15
+
 
 def shade_full(scene, origin, directions, *, depth=4, background=(0, 0, 0)):
     """Linear colours that rays from one origin see, and how many rays it took.
@@ -48,9 +51,12 @@ def shade_full(scene, origin, directions, *, depth=4, background=(0, 0, 0)):
     if scene.sky is not None:
         sky_size = len(scene.sky.pixels)
         sky = np.pad(scene.sky.pixels.reshape(-1, 3), ((0, 0), (0, 1)), constant_values=255)
-    ambient = tuple(float(channel) for channel in lamps([Light("point", color=scene.ambient)]).color[0])
+    lights, ambient = scene.lights, scene.ambient
+    if not lights:
+        lights, ambient = [Light.headlight(origin)], ambient if any(ambient) else (_HEADLIGHTS_AMBIENT,) * 3
+    ambient = tuple(float(channel) for channel in lamps([Light("point", color=ambient)]).color[0])
     shade_pixels(np.asarray(origin, np.float64), np.ascontiguousarray(directions, np.float64), depth,
                  *scene_geometry(scene), surfaces(scene), looks(scene.materials),
-                 lamps(scene.lights or [Light.headlight(origin)]), ambient, sky, sky_size,
+                 lamps(lights), ambient, sky, sky_size,
                  background_color(background), colors, counts)
     return colors, [dict(zip(COUNTS, level.tolist(), strict=True)) for level in counts.sum(axis=0)]

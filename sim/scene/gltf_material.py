@@ -92,9 +92,9 @@ class GltfMaterials:
         common = dict(texture=texture, opacity=_unit(color[3]), alpha_mode=mode,
                       alpha_cutoff=_unit(element.real("alphaCutoff", 0.5)))
         if extension("KHR_materials_unlit"):
-            # Its colour is there whatever the light; with a texture it needs light from all sides, which nothing gives.
+            # Emission has no texture, so a textured one is drawn as a matt one.
             if texture is not None:
-                self._note(element, "the texture of an unlit material, except in the scene's light,")
+                self._note(element, "a texture that is not lit")
                 return Material(name, rgb, **common)
             return Material(name, (0.0, 0.0, 0.0), emission=rgb, **common)
         facing = ((index - 1) / (index + 1)) ** 2 * (_unit(dielectric.real("specularFactor", 1.0)) if dielectric else 1)

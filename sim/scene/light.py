@@ -89,9 +89,9 @@ class Light:
 
     @classmethod
     def headlight(cls, eye):
-        """The light of scenes that have none: white, at the eye, without falloff."""
+        """The light of scenes that have none: white, at the eye, without falloff, intensity 0.85."""
         # 2⁶⁰: beyond all scenes, and its square well within float64.
-        return cls("point", position=eye, radius=2.0**60, intensity=2.0**120, name="headlight")
+        return cls("point", position=eye, radius=2.0**60, intensity=0.85 * 2.0**120, name="headlight")
 
     def placed(self, matrix):
         """The light with its position and direction mapped by a 4×4 matrix."""

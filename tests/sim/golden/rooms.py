@@ -20,7 +20,7 @@ def quad(corners, material, *, uvs=None):
     return Mesh("quad", np.asarray(corners, np.float64), triangles, np.zeros(2, np.int32), uvs=uvs), material
 
 
-def ball(center, radius, material, *, num_rings=24, smooth=False, inward=False):
+def ball(center, radius, material, *, num_rings=24, smooth=False):
     """A sphere of triangles about ``center``, its vertices on the sphere."""
     theta, phi = np.pi * np.arange(1, num_rings) / num_rings, np.pi * np.arange(2 * num_rings) / num_rings
     ring = np.stack([np.outer(np.sin(theta), np.cos(phi)), np.outer(np.sin(theta), np.sin(phi)),
@@ -34,9 +34,7 @@ def ball(center, radius, material, *, num_rings=24, smooth=False, inward=False):
             triangles += [(row + j, row + n + j, row + n + k), (row + j, row + n + k, row + k)]
         triangles.append((len(points) - 1, (num_rings - 2) * n + k, (num_rings - 2) * n + j))
     triangles = np.array(triangles, np.int32)
-    if inward:
-        triangles = triangles[:, ::-1]
-    normals = points[triangles] * (-1 if inward else 1) if smooth else None
+    normals = points[triangles] if smooth else None
     mesh = Mesh("ball", points * radius + center, triangles, np.zeros(len(triangles), np.int32), normals=normals)
     return mesh, material
 

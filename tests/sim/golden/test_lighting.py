@@ -102,9 +102,11 @@ def test_metals_tint_their_highlights_and_mirrors():
 def test_a_scene_without_lights_is_lit_from_the_eye():
     scene = scene_of(ground(), quad([(-1, -1, 0.5), (1, -1, 0.5), (1, 1, 0.5), (-1, 1, 0.5)], BLACK))
     eye = np.array((0.0, 0, 6))
-    assert see(scene, eye, (3, 4, -6.0))[0] == pytest.approx(6 / math.sqrt(61))
+    assert see(scene, eye, (3, 4, -6.0))[0] == pytest.approx(0.15 + 0.85 * 6 / math.sqrt(61))
     # From the eye itself nothing is in the shadow.
-    assert see(scene, eye, (1.1, 0, -6.0))[0] == pytest.approx(6 / math.hypot(6, 1.1))
+    assert see(scene, eye, (1.1, 0, -6.0))[0] == pytest.approx(0.15 + 0.85 * 6 / math.hypot(6, 1.1))
+    assert see(replace(scene, ambient=(0.0, 0.5, 0.0)), eye, (0, 2, -6.0)) == pytest.approx(
+        0.85 * 6 / math.hypot(6, 2) + np.array((0, 0.5, 0)))
 
 
 def random_transform(rng):
