@@ -39,7 +39,8 @@ def render_golden(scene, camera, width, height, *, background=(0, 0, 0), shading
     Returns
     -------
     Frame
-        That of full shading reports ``rays``, a list with the numbers of rays of each generation.
+        Its hits are those of primary rays, holes of textures included. That of full shading reports ``rays``, their
+        number, and ``levels``, what became of each generation.
     """
     if shading not in SHADINGS:
         raise ValueError(f"shading is '{shading}'; it must be {' or '.join(SHADINGS)}")
@@ -51,7 +52,8 @@ def render_golden(scene, camera, width, height, *, background=(0, 0, 0), shading
     if shading == "full":
         colors, levels = shade_full(scene, origin, directions, depth=depth, background=background)
         frame.color[:] = np.rint(255 * _srgb(colors))
-        frame.report["rays"] = levels
+        frame.report["rays"] = sum(level["rays"] + level["shadow"] for level in levels)
+        frame.report["levels"] = levels
     else:
         _shade_simply(frame, scene, hits, directions)
     return frame

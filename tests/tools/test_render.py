@@ -83,7 +83,9 @@ def test_full_shading(tmp_path):
     scene = load_scene("mirror-room")
     golden = render_golden(scene, scene.default_camera(), 64, 48, shading="full", depth=2)
     assert (np.asarray(Image.open(tmp_path / "room.png")) == golden.color).all()
-    levels = json.loads(report.read_text())["rays"]
+    described = json.loads(report.read_text())
+    levels = described["levels"]
+    assert described["rays"] == sum(level["rays"] + level["shadow"] for level in levels)
     assert len(levels) == 3
     assert levels[0]["rays"] == 64 * 48
     assert levels[1]["rays"] == sum(levels[0][kind] for kind in ("reflection", "refraction", "transparency")) > 0

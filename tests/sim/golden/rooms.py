@@ -3,14 +3,19 @@
 import numpy as np
 
 from sim.golden import shade_full
-from sim.scene import Instance, Light, Material, Mesh, Scene
+from sim.scene import Instance, Light, Material, Mesh, Scene, Texture
 
-__all__ = ["BLACK", "FAR", "WHITE", "ball", "quad", "scene_of", "see"]
+__all__ = ["BLACK", "CHECKED", "DOWN", "FAR", "WHITE", "ball", "ground", "leaf", "lit", "quad", "scene_of", "see"]
 
 WHITE = Material("white", (1.0, 1.0, 1.0))
 BLACK = Material("black", (0.0, 0.0, 0.0))
 #: A lamp that reaches nothing: scenes with it have no headlight.
 FAR = Light("point", position=(0, 0, 1e6), intensity=0.0)
+DOWN = (0.0, 0.0, -1.0)
+#: Red, green with opacity 0, blue with 64/255, white; from v = 0.
+CHECKED = Texture("checked", np.array([[(255, 0, 0, 255), (0, 255, 0, 0)], [(0, 0, 255, 64), (255, 255, 255, 255)]],
+                                      np.uint8), filtered=False)
+_CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
 
 def quad(corners, material, *, uvs=None):
@@ -56,3 +61,19 @@ def see(scene, origin, directions, **options):
     directions = np.asarray(directions, np.float64)
     colors, _ = shade_full(scene, np.asarray(origin, np.float64), directions.reshape(1, -1, 3), **options)
     return colors.reshape(directions.shape)
+
+
+def ground(material=WHITE, **others):
+    """A large floor at z = 0."""
+    return quad([(-50, -50, 0), (50, -50, 0), (50, 50, 0), (-50, 50, 0)], material, **others)
+
+
+def lit(light, point=(0.0, 0.0), *, material=WHITE, eye=(0.3, 0.2, 1.0), **others):
+    """Colour of a point of the ground."""
+    scene = scene_of(ground(material), lights=[light], **others)
+    return see(scene, eye, np.array((*point, 0.0)) - eye)
+
+
+def leaf(material, z):
+    """A square from (0, 0) to (2, 2) with a texture once across."""
+    return quad([(0, 0, z), (2, 0, z), (2, 2, z), (0, 2, z)], material, uvs=_CORNERS)
