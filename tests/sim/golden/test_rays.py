@@ -196,23 +196,28 @@ def test_convex_bodies_neither_mirror_nor_shadow_themselves(smooth, center):
         assert colors[clearly][:, 0] == pytest.approx((10 * cosine / distance**2)[clearly], rel=1e-6)
 
 
+def edge_points(mesh, count):
+    """Points on edges of a mesh, clearly on the side of (2, −4, 3) and (0, −4, 1)."""
+    rng = np.random.default_rng(1)
+    picked = mesh.vertices[mesh.triangles[rng.integers(mesh.num_triangles, size=count)]]
+    s = rng.uniform(0, 1, (count, 1))
+    points = (1 - s) * picked[:, 0] + s * picked[:, 1]
+    return points[(points @ (2, -4, 3) > 2.5) & (points @ (0, -4, 1) > 2.0)]
+
+
 @pytest.mark.parametrize("transform", [np.eye(3, 4), [[3, 1, 0, 70], [0, 0.7, 0.4, -80], [0.2, 0, 1.5, 90]]])
-def test_edges_are_not_in_their_own_shadow(transform):
-    """Where a ray meets an edge, the triangle on its other side must not hide the light: 5.7's ε."""
+def test_rays_that_meet_edges_get_away_from_them(transform):
+    """The triangle on the edge's other side must neither hide the light (5.7's ε) nor catch the mirrored ray (3.7)."""
     transform = np.asarray(transform, np.float64)
-    mesh, material = ball((0, 0, 0), 1.0, WHITE, num_rings=12)
+    mesh, material = ball((0, 0, 0), 1.0, replace(MIRROR, reflection=0.5), num_rings=12)
     light = Light("point", position=transform @ (2, -4, 3, 1), intensity=100)
     scene = scene_of((mesh, material), transforms=[transform], lights=[light])
-    rng = np.random.default_rng(1)
-    picked = mesh.vertices[mesh.triangles[rng.integers(mesh.num_triangles, size=40_000)]]
-    s = rng.uniform(0, 1, (len(picked), 1))
-    targets = (1 - s) * picked[:, 0] + s * picked[:, 1]
-    # Clearly on the lit side and on that of the eye, before the transform as after.
-    targets = targets[(targets @ (2, -4, 3) > 2.5) & (targets @ (0, -4, 1) > 2.0)]
+    targets = edge_points(mesh, 40_000)
     assert len(targets) > 3000
     eye = transform @ (0, -4, 1, 1)
-    colors = see(scene, eye, targets @ transform[:, :3].T + transform[:, 3] - eye)
+    colors, levels = shade_full(scene, eye, (targets @ transform[:, :3].T + transform[:, 3] - eye)[None], depth=1)
     assert (colors > 0).all()
+    assert levels[1]["misses"] == levels[0]["hits"] == len(targets)
 
 
 def test_the_inside_of_a_body_is_found_again_by_its_own_rays():
