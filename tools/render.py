@@ -4,6 +4,7 @@ import contextlib
 import json
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -12,11 +13,12 @@ from PIL import Image
 from rich.console import Console
 
 from fpu import FloatFormat
-from sim.golden import psnr, render_golden
+from sim.golden import MAX_DEPTH, SHADINGS, psnr, render_golden
 from sim.machine import render_pysim, render_rtl
 from sim.model import render_model
-from sim.scene import load_scene
+from sim.scene import Sky, load_scene
 from sim.scene.compile import CompiledScene
+from sim.scene.texture import decode_texture
 
 from .errors import BadInput, clear_errors, written_whole
 from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, chip_config
@@ -41,6 +43,12 @@ _CHECKED_PIXELS = 1 << 21
 @click.option("--view", type=click.IntRange(min=0), help="Number of a camera in the scene's file  [default: the first]")
 @click.option("--frames", type=click.IntRange(min=1), help="Draw so many pictures of an animated scene, as "
               "NAME-0000.png and so on")
+@click.option("--shading", type=click.Choice(SHADINGS), default="simple", show_default=True, help="simple: colour "
+              "times cosine; full: lights, shadows, textures, reflection, refraction (with --engine golden)")
+@click.option("--depth", type=click.IntRange(0, MAX_DEPTH), help="Generations of secondary rays of full shading  "
+              "[default: 4]")
+@click.option("--sky", type=click.Path(dir_okay=False, path_type=Path), help="Panorama (equirectangular picture) "
+              "round the scene, for full shading  [default: the scene's own, else the background]")
 @click.option("--background", type=click.IntRange(0, 255), nargs=3, default=(0, 0, 0), show_default=True,
               metavar="R G B")
 @click.option("--flatten/--instances", default=None, help="Put all triangles into one space, or transform rays into "
@@ -58,10 +66,12 @@ _CHECKED_PIXELS = 1 << 21
               "prim_id, t, u, v of each pixel")
 @click.option("--report", type=click.Path(dir_okay=False, path_type=Path), help="JSON to write")
 @click.option("--check/--no-check", default=True, help="Compare with the model and with golden")
-def render(scene, output, engine, size, fmt, camera, view, frames, background, flatten, parameters, latency, jitter,
-           seed, wave, wave_cycles, wave_pixels, hits, report, check):
-    """Draw SCENE: an .obj, .ply, .ply.gz, .gltf or .glb file, or 'room', the built-in one."""
+def render(scene, output, engine, size, fmt, camera, view, frames, shading, depth, sky, background, flatten,
+           parameters, latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
+    """Draw SCENE: an .obj, .ply, .ply.gz, .gltf or .glb file, or a built-in one: room, mirror-room, vpl, walk or
+    sunflowers."""
     config = chip_config(fmt, parameters)
+    _check_shading(engine, shading, depth, sky)
     _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames, hits)
     output = output or Path(f"{Path(scene).name.split('.')[0]}.png")
     for path in (output, wave, hits, report):
@@ -71,10 +81,12 @@ def render(scene, output, engine, size, fmt, camera, view, frames, background, f
     with clear_errors(), contextlib.ExitStack() as files:
         loaded = load_scene(scene)
         chosen = _camera(loaded, camera, view)
+        if sky is not None:
+            loaded = replace(loaded, sky=_panorama(sky, chosen))
         if frames and not loaded.is_animated:
             raise BadInput(f"{scene}: nothing moves in this scene; leave --frames out")
         compiled = None
-        if engine != "golden" or check:
+        if shading == "simple" and (engine != "golden" or check):
             with _progress(console, "building kd-trees"):
                 compiled = CompiledScene(loaded, fmt=fmt, stack_depth=config.stack_depth,
                                          index_width=config.index_width, flatten=flatten)
@@ -87,8 +99,8 @@ def render(scene, output, engine, size, fmt, camera, view, frames, background, f
         for number, at in enumerate(times):
             posed = loaded.at_time(at)
             view_now = chosen if camera is not None else _camera(posed, None, view)
-            frame = _draw(engine, posed, compiled, view_now, size, config, background, latency, jitter, seed,
-                          wave_file, wave_cycles, wave_pixels, console)
+            frame = _draw(engine, posed, compiled, view_now, size, config, background, shading, depth, latency, jitter,
+                          seed, wave_file, wave_cycles, wave_pixels, console)
             _describe(frame, engine, scene, size, config)
             if check:
                 _compare(frame, engine, posed, compiled, view_now, size, config, background)
@@ -109,6 +121,15 @@ def render(scene, output, engine, size, fmt, camera, view, frames, background, f
             reports = [frame.report for _, frame in drawn]
             with written_whole(report) as path:
                 path.write_text(json.dumps(reports if frames else reports[0], indent=1) + "\n")
+
+
+def _check_shading(engine, shading, depth, sky):
+    if shading == "full" and engine != "golden":
+        raise click.UsageError(f"--shading full: the engine {engine} has the simple shader only; use --engine golden")
+    if depth is not None and shading != "full":
+        raise click.UsageError("--depth is of full shading; use --shading full")
+    if sky is not None and shading != "full":
+        raise click.UsageError("--sky is of full shading; use --shading full")
 
 
 def _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames, hits):
@@ -146,6 +167,16 @@ def _camera(scene, camera, view):
     return scene.cameras[view]
 
 
+def _panorama(path, camera):
+    """The sky in a file, its upper edge at the world's axis nearest to the camera's up."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise BadInput(f"--sky: {path}: {error.strerror}") from error
+    up = np.eye(3)[np.abs(camera.up).argmax()] * np.sign(camera.up[np.abs(camera.up).argmax()])
+    return Sky.from_panorama(decode_texture(data, str(path), []).pixels, up=up)
+
+
 @contextlib.contextmanager
 def _progress(console, what):
     if not sys.stderr.isatty():
@@ -155,12 +186,13 @@ def _progress(console, what):
         yield lambda text: status.update(text)
 
 
-def _draw(engine, scene, compiled, camera, size, config, background, latency, jitter, seed, wave, wave_cycles,
-          wave_pixels, console):
+def _draw(engine, scene, compiled, camera, size, config, background, shading, depth, latency, jitter, seed, wave,
+          wave_cycles, wave_pixels, console):
     begin = time.perf_counter()
     with _progress(console, f"drawing by {engine}") as progress:
         if engine == "golden":
-            frame = render_golden(scene, camera, *size, background=background)
+            frame = render_golden(scene, camera, *size, background=background, shading=shading,
+                                  depth=4 if depth is None else depth)
         else:
             image = compiled.image(scene)
             common = dict(config=config, background=background)

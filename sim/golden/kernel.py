@@ -10,7 +10,7 @@ import numpy as np
 
 from .bvh import MAX_DEPTH
 
-__all__ = ["trace_rays"]
+__all__ = ["enters", "hit_triangle", "next_node", "trace_ray", "trace_rays"]
 
 _STACK_DEPTH = MAX_DEPTH + 1
 # Bound on the relative error of the slab distances, on the far side: 1 + 2·gamma(3) and some.
@@ -18,7 +18,7 @@ _WIDEN = 1.0 + 8 * 2.0 ** -53
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _enters(lower, upper, origin, inverse, t_far):
+def enters(lower, upper, origin, inverse, t_far):
     """Distance at which the ray enters the box, inf if it does not before ``t_far``."""
     t_near = 0.0
     for k in range(3):
@@ -35,7 +35,7 @@ def _enters(lower, upper, origin, inverse, t_far):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _hit_triangle(corners, origin, kx, ky, kz, sx, sy, sz):
+def hit_triangle(corners, origin, kx, ky, kz, sx, sy, sz):
     """(t, u, v), or t = inf on a miss; the ray is sheared to run along +z from 0."""
     ax, ay = corners[0, kx] - origin[kx], corners[0, ky] - origin[ky]
     bx, by = corners[1, kx] - origin[kx], corners[1, ky] - origin[ky]
@@ -54,11 +54,11 @@ def _hit_triangle(corners, origin, kx, ky, kz, sx, sy, sz):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _next_node(node, base, lower, upper, first, origin, inverse, t_far, stack, num_waiting):
+def next_node(node, base, lower, upper, first, origin, inverse, t_far, stack, num_waiting):
     """Put those children of an inner node on the stack that the ray enters, the nearer one on top."""
     child = base + first[node]
-    t0 = _enters(lower[child], upper[child], origin, inverse, t_far)
-    t1 = _enters(lower[child + 1], upper[child + 1], origin, inverse, t_far)
+    t0 = enters(lower[child], upper[child], origin, inverse, t_far)
+    t1 = enters(lower[child + 1], upper[child + 1], origin, inverse, t_far)
     near = 0 if t0 <= t1 else 1
     if max(t0, t1) < np.inf:
         stack[num_waiting] = child + 1 - near
@@ -89,17 +89,17 @@ def _trace_mesh(origin, direction, t_min, best, nodes, corners, bases, instance_
     while num_waiting:
         num_waiting -= 1
         node = stack[num_waiting]
-        if _enters(lower[node], upper[node], origin, inverse, best[0]) == np.inf:
+        if enters(lower[node], upper[node], origin, inverse, best[0]) == np.inf:
             continue
         if not count[node]:
-            num_waiting = _next_node(node, node_base, lower, upper, first, origin, inverse, best[0], stack,
+            num_waiting = next_node(node, node_base, lower, upper, first, origin, inverse, best[0], stack,
                                      num_waiting)
             continue
         for i in range(first[node], first[node] + count[node]):
             prim_id = items[item_base + i]
             if instance_id == excluded[0] and prim_id == excluded[1]:
                 continue
-            t, u, v = _hit_triangle(corners[triangle_base + prim_id], origin, kx, ky, kz, sx, sy, sz)
+            t, u, v = hit_triangle(corners[triangle_base + prim_id], origin, kx, ky, kz, sx, sy, sz)
             if t_min < t < np.inf and (t < best[0] or (t == best[0] and (
                     instance_id < best[3] or (instance_id == best[3] and prim_id < best[4])))):
                 best = (t, u, v, instance_id, prim_id)
@@ -107,7 +107,7 @@ def _trace_mesh(origin, direction, t_min, best, nodes, corners, bases, instance_
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _trace_ray(origin, direction, t_min, excluded, top, inverses, bases, nodes, corners):
+def trace_ray(origin, direction, t_min, excluded, top, inverses, bases, nodes, corners):
     """Closest hit of one ray: (t, u, v, instance_id, prim_id)."""
     lower, upper, first, count, items = top
     best = (np.inf, 0.0, 0.0, np.int64(-1), np.int64(-1))
@@ -121,10 +121,10 @@ def _trace_ray(origin, direction, t_min, excluded, top, inverses, bases, nodes, 
     while num_waiting:
         num_waiting -= 1
         node = stack[num_waiting]
-        if _enters(lower[node], upper[node], origin, inverse, best[0]) == np.inf:
+        if enters(lower[node], upper[node], origin, inverse, best[0]) == np.inf:
             continue
         if not count[node]:
-            num_waiting = _next_node(node, 0, lower, upper, first, origin, inverse, best[0], stack, num_waiting)
+            num_waiting = next_node(node, 0, lower, upper, first, origin, inverse, best[0], stack, num_waiting)
             continue
         for i in range(first[node], first[node] + count[node]):
             instance = items[i]
@@ -163,7 +163,7 @@ def trace_rays(origins, directions, t_min, excluded, top, inverses, bases, nodes
         Receives t, u, v; inf, 0, 0 on a miss.
     """
     for ray in numba.prange(len(origins)):
-        hit = _trace_ray(origins[ray], directions[ray], t_min, (excluded[0, ray], excluded[1, ray]), top, inverses,
+        hit = trace_ray(origins[ray], directions[ray], t_min, (excluded[0, ray], excluded[1, ray]), top, inverses,
                          bases, nodes, corners)
         distances[0, ray], distances[1, ray], distances[2, ray] = hit[0], hit[1], hit[2]
         ids[0, ray], ids[1, ray] = hit[3], hit[4]

@@ -2,13 +2,14 @@
 
 import weakref
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
 from .bvh import Bvh, build_bvh
 from .kernel import trace_rays
 
-__all__ = ["Hits", "render", "trace"]
+__all__ = ["Geometry", "Hits", "render", "scene_geometry", "trace"]
 
 # A mesh never changes, so its hierarchy is built once for all frames and calls.
 _mesh_bvhs = weakref.WeakKeyDictionary()
@@ -45,7 +46,7 @@ class Hits:
 
     def reshape(self, *shape):
         """The same hits in another shape."""
-        return Hits(*(getattr(self, field.name).reshape(*shape) for field in fields(self)))
+        return Hits(*(getattr(self, field.name).reshape(shape) for field in fields(self)))
 
 
 def _mesh_bvh(mesh):
@@ -77,6 +78,31 @@ def _unit_normals(corners):
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
+class Geometry(NamedTuple):
+    """A scene's triangles and hierarchies as :func:`sim.golden.kernel.trace_rays` takes them."""
+
+    top: Bvh
+    inverses: np.ndarray
+    bases: np.ndarray
+    nodes: Bvh
+    corners: np.ndarray
+
+
+def scene_geometry(scene):
+    """Geometry of a scene; the meshes' hierarchies are kept for the next frame."""
+    corners, bvhs = zip(*map(_mesh_bvh, scene.meshes), strict=True)
+    sizes = [(len(bvh.first), len(bvh.items), len(c)) for bvh, c in zip(bvhs, corners, strict=True)]
+    mesh_of = np.array([instance.mesh for instance in scene.instances])
+    bases = np.cumsum([(0, 0, 0), *sizes], axis=0)[mesh_of]
+    corners, nodes = np.concatenate(corners), Bvh(*map(np.concatenate, zip(*bvhs, strict=True)))
+    lower, upper = _world_boxes(scene)
+    top = build_bvh(lower, upper, (lower <= upper).all(axis=1))
+    maps = np.tile(np.eye(4), (len(scene.instances), 1, 1))
+    maps[:, :3] = [instance.transform for instance in scene.instances]
+    inverses = np.ascontiguousarray(np.linalg.inv(maps)[:, :3])
+    return Geometry(top, inverses, bases, nodes, corners)
+
+
 def trace(scene, origins, directions, t_min=0.0, *, exclude=None):
     """Closest hit of each ray at t > ``t_min``; ties go to the lowest (instance_id, prim_id).
 
@@ -104,22 +130,12 @@ def trace(scene, origins, directions, t_min=0.0, *, exclude=None):
         exclude = (-1, -1)
     excluded = np.ascontiguousarray(np.stack([np.broadcast_to(i, shape).reshape(n) for i in exclude]), np.int32)
 
-    corners, bvhs = zip(*map(_mesh_bvh, scene.meshes), strict=True)
-    sizes = [(len(bvh.first), len(bvh.items), len(c)) for bvh, c in zip(bvhs, corners, strict=True)]
-    mesh_of = np.array([instance.mesh for instance in scene.instances])
-    bases = np.cumsum([(0, 0, 0), *sizes], axis=0)[mesh_of]
-    corners, nodes = np.concatenate(corners), Bvh(*map(np.concatenate, zip(*bvhs, strict=True)))
-    lower, upper = _world_boxes(scene)
-    top = build_bvh(lower, upper, (lower <= upper).all(axis=1))
-    maps = np.tile(np.eye(4), (len(scene.instances), 1, 1))
-    maps[:, :3] = [instance.transform for instance in scene.instances]
-    inverses = np.ascontiguousarray(np.linalg.inv(maps)[:, :3])
-
+    geometry = scene_geometry(scene)
     ids, distances = np.empty((2, n), np.int32), np.empty((3, n))
-    trace_rays(origins, directions, float(t_min), excluded, top, inverses, bases, nodes, corners, ids, distances)
+    trace_rays(origins, directions, float(t_min), excluded, *geometry, ids, distances)
     dot, hit = np.zeros(n), ids[1] >= 0
-    normals = _unit_normals(corners[bases[ids[0, hit], 2] + ids[1, hit]])
-    dot[hit] = np.einsum("ni,nij,nj->n", normals, inverses[ids[0, hit], :, :3], directions[hit])
+    normals = _unit_normals(geometry.corners[geometry.bases[ids[0, hit], 2] + ids[1, hit]])
+    dot[hit] = np.einsum("ni,nij,nj->n", normals, geometry.inverses[ids[0, hit], :, :3], directions[hit])
     return Hits(*ids, *distances, dot).reshape(*shape)
 
 

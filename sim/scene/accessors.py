@@ -1,7 +1,6 @@
 """glTF buffers and accessors as numpy arrays; nothing is believed that the file does not hold."""
 
 import base64
-import binascii
 import urllib.parse
 
 import numpy as np
@@ -9,13 +8,43 @@ import numpy as np
 from .error import SceneError
 from .files import inside
 
-__all__ = ["Accessors"]
+__all__ = ["Accessors", "read_uri"]
 
 _COMPONENTS = {5120: np.dtype("i1"), 5121: np.dtype("u1"), 5122: np.dtype("<i2"), 5123: np.dtype("<u2"),
                5125: np.dtype("<u4"), 5126: np.dtype("<f4")}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 # Elements of an accessor without data (all zero): a few bytes of file must not claim the machine's memory.
 _MAX_ZEROS = 1 << 24
+
+
+def read_uri(element, uri, folder):
+    """Bytes that an element's ``uri`` holds (data:) or names (a file in the scene's folder).
+
+    Raises
+    ------
+    SceneError
+        If it is neither, or there is no such file.
+    """
+    if uri.startswith("data:"):
+        head, _, body = uri.partition(",")
+        try:
+            return base64.b64decode(body, validate=True) if head.endswith(";base64") \
+                else urllib.parse.unquote_to_bytes(body)
+        except ValueError as error:
+            raise element.error(f"bad base64 data: {error}") from None
+    try:
+        scheme = urllib.parse.urlsplit(uri).scheme
+    except ValueError as error:
+        raise element.error(f"'{uri}' is no uri: {error}") from None
+    if scheme:
+        raise element.error(f"'{uri}' is not a file name; only files beside the scene are read")
+    try:
+        path = inside(folder, urllib.parse.unquote(uri))
+        return path.read_bytes()
+    except SceneError as error:
+        raise element.error(error) from None
+    except OSError as error:
+        raise element.error(f"{path}: {error.strerror}") from None
 
 
 class Accessors:
@@ -39,22 +68,7 @@ class Accessors:
             if buffer.place != "buffers[0]" or self.binary is None:
                 raise buffer.error("has no uri, and no binary chunk holds it")
             return self.binary
-        if uri.startswith("data:"):
-            head, _, body = uri.partition(",")
-            try:
-                return base64.b64decode(body, validate=True) if head.endswith(";base64") \
-                    else urllib.parse.unquote_to_bytes(body)
-            except binascii.Error as error:
-                raise buffer.error(f"bad base64 data: {error}") from None
-        if urllib.parse.urlsplit(uri).scheme:
-            raise buffer.error(f"'{uri}' is not a file name; only files beside the scene are read")
-        try:
-            path = inside(self.folder, urllib.parse.unquote(uri))
-            return path.read_bytes()
-        except SceneError as error:
-            raise buffer.error(error) from None
-        except OSError as error:
-            raise buffer.error(f"{path}: {error.strerror}") from None
+        return read_uri(buffer, uri, self.folder)
 
     def _buffer(self, buffer):
         if buffer.place not in self._buffers:
@@ -64,13 +78,23 @@ class Accessors:
             self._buffers[buffer.place] = data
         return self._buffers[buffer.place]
 
+    def _place(self, view):
+        """Buffer, offset and length of a buffer view."""
+        data = self._buffer(view.refer("buffer", "buffers"))
+        offset, length = view.whole("byteOffset", 0), view.whole("byteLength")
+        if offset + length > len(data):
+            raise view.error(f"ends at byte {offset + length} of a buffer of {len(data)}")
+        return data, offset, length
+
+    def view_bytes(self, view):
+        """Bytes of a buffer view, as images are stored."""
+        data, offset, length = self._place(view)
+        return bytes(data[offset:offset + length])
+
     def _elements(self, source, count, dtype, width):
         """Array[count, width] over the buffer view that ``source`` (an accessor or part of one) names."""
         view = source.refer("bufferView", "bufferViews")
-        data = self._buffer(view.refer("buffer", "buffers"))
-        view_offset, view_length = view.whole("byteOffset", 0), view.whole("byteLength")
-        if view_offset + view_length > len(data):
-            raise view.error(f"ends at byte {view_offset + view_length} of a buffer of {len(data)}")
+        data, view_offset, view_length = self._place(view)
         element = dtype.itemsize * width
         stride = view.whole("byteStride", element)
         if stride < element:

@@ -1,13 +1,14 @@
 """Motion of a node hierarchy by key frames, as glTF 2.0 defines it (section 3.11, appendix C)."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from .camera import Camera
+from .light import Light
 
-__all__ = ["Animation", "CameraNode", "Channel", "Node", "compose", "pose_nodes"]
+__all__ = ["Animation", "CameraNode", "Channel", "LightNode", "Node", "compose", "pose_nodes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +127,18 @@ class CameraNode:
 
 
 @dataclass(frozen=True, eq=False)
+class LightNode:
+    """A light carried by a node, given in the node's space."""
+
+    node: int
+    prototype: Light
+
+    def light(self, world):
+        """The light where the nodes' world transforms float64[N, 4, 4] put it; scale does not change its strength."""
+        return self.prototype.placed(world[self.node])
+
+
+@dataclass(frozen=True, eq=False)
 class Animation:
     """Motion of a scene.
 
@@ -138,6 +151,8 @@ class Animation:
     instance_nodes : list of int
         The node of each instance of the scene.
     camera_nodes : list of CameraNode
+    light_nodes : list of LightNode
+        All lights of the scene; empty if none of them moves.
     """
 
     nodes: list[Node]
@@ -145,6 +160,7 @@ class Animation:
     channels: list[Channel]
     instance_nodes: list[int]
     camera_nodes: list[CameraNode]
+    light_nodes: list[LightNode] = field(default_factory=list)
 
     @property
     def duration(self):
@@ -152,6 +168,7 @@ class Animation:
         return max(float(channel.times[-1]) for channel in self.channels)
 
     def pose(self, t):
-        """``(transforms float64[I, 3, 4], cameras)`` of the scene's instances and cameras at time ``t``."""
+        """``(transforms float64[I, 3, 4], cameras, lights)`` of the scene at time ``t``."""
         world = pose_nodes(self.nodes, self.order, self.channels, t)
-        return world[self.instance_nodes][:, :3], [camera.camera(world) for camera in self.camera_nodes]
+        return (world[self.instance_nodes][:, :3], [camera.camera(world) for camera in self.camera_nodes],
+                [light.light(world) for light in self.light_nodes])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -38,6 +39,11 @@ class _Part:
     rows: np.ndarray
     centers: np.ndarray
     tree: object
+
+    @cached_property
+    def box(self):
+        """float64[2, 3]: lower and upper bounds."""
+        return np.array([self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))])
 
 
 def _unit_box(lower, upper):
@@ -241,9 +247,8 @@ class CompiledScene:
                                  f"are from {fmt.min_normal:.3g} to {fmt.max:.3g}; choose a format with more exponent "
                                  "bits, or scale the instance less")
             # The chip's map is the rounded one, so the box is that of its inverse.
-            box = np.array([part.corners.min(axis=(0, 1)), part.corners.max(axis=(0, 1))])
             which = np.indices((2, 2, 2)).reshape(3, 8).T
-            world = np.take_along_axis(box, which, axis=0) @ np.linalg.inv(maps[slot, :3]).T + maps[slot, 3]
+            world = np.take_along_axis(part.box, which, axis=0) @ np.linalg.inv(maps[slot, :3]).T + maps[slot, 3]
             # What the transformed ray is off by in the mesh's space, seen from the scene's.
             slack = 4 * 2.0 ** -fmt.frac_width * np.abs(world - maps[slot, 3]).max()
             boxes[slot] = world.min(axis=0) - slack, world.max(axis=0) + slack

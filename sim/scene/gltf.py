@@ -1,4 +1,4 @@
-"""glTF 2.0: meshes, node hierarchy with instances, cameras, base colours and node animations.
+"""glTF 2.0: meshes, node hierarchy with instances, cameras and node animations.
 
 The file is read with ``json`` and numpy alone, so that each message can name the element at fault.
 """
@@ -11,12 +11,15 @@ import numpy as np
 from .accessors import Accessors
 from .animation import Animation, CameraNode, Channel, Node, pose_nodes
 from .gltf_json import read_gltf_file
-from .scene import DEFAULT_MATERIAL, Instance, Material, Mesh, Scene
+from .gltf_light import LIGHT_EXTENSIONS, light_nodes
+from .gltf_material import MATERIAL_EXTENSIONS, GltfMaterials
+from .scene import DEFAULT_MATERIAL, Instance, Mesh, Scene
 
 __all__ = ["load_gltf"]
 
 _MODES = ("points", "lines", "line loop", "line strip", "triangles", "triangle strip", "triangle fan")
 _PATHS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
+_NOT_DRAWN = {"COLOR_0": "vertex colours (COLOR_0)", "JOINTS_0": "skins (JOINTS_0)", "targets": "morph targets"}
 # glTF leaves the picture's shape to the viewer: where a camera gives none, ours is that of the default
 # picture.
 _DEFAULT_ASPECT = 4 / 3
@@ -46,6 +49,11 @@ def _primitive(primitive, accessors, warnings):
     if attributes is None or "POSITION" not in attributes.data:
         warnings.append(f"{primitive.place}: has no POSITION; left out")
         return None
+
+    for key, what in _NOT_DRAWN.items():
+        text = f"{what} cannot be drawn; left out"
+        if (key in attributes.data or key in primitive.data) and text not in warnings:
+            warnings.append(text)
 
     def attribute(key, kind):
         if key not in attributes.data:
@@ -93,12 +101,6 @@ def _mesh(mesh, accessors, warnings):
         return Mesh(name, np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros(0, np.int32))
     return Mesh(name, np.concatenate(positions), np.concatenate(triangles).astype(np.int32),
                 np.concatenate(material_ids), normals=_joined(normals), uvs=_joined(uvs))
-
-
-def _material(material):
-    pbr = material.child("pbrMetallicRoughness")
-    color = pbr.reals("baseColorFactor", 4, [1.0] * 4) if pbr else [1.0] * 4
-    return Material(material.text("name", material.place), tuple(min(max(float(c), 0.0), 1.0) for c in color[:3]))
 
 
 def _nodes(root):
@@ -193,7 +195,7 @@ def load_gltf(path):
         Naming the element of the file that is wrong.
     """
     path = Path(path)
-    root, binary = read_gltf_file(path)
+    root, binary = read_gltf_file(path, (*MATERIAL_EXTENSIONS, *LIGHT_EXTENSIONS))
     accessors, warnings = Accessors(path.parent, binary), []
     elements, nodes, order, shown = _nodes(root)
     instance_nodes = [i for i in shown if "mesh" in elements[i].data]
@@ -204,6 +206,7 @@ def load_gltf(path):
     meshes = [_mesh(all_meshes[i], accessors, warnings) for i in used]
     camera_nodes = [_camera(elements[i], i, warnings) for i in shown if "camera" in elements[i].data]
     camera_nodes = [camera for camera in camera_nodes if camera is not None]
+    lights = light_nodes(root, elements, shown, warnings)
     channels = [_channel(channel, animation.list("samplers"), accessors, nodes, warnings)
                 for animation in root.list("animations") for channel in animation.list("channels")]
     channels = [channel for channel in channels if channel is not None]
@@ -212,6 +215,7 @@ def load_gltf(path):
     names = [elements[i].text("name", elements[i].place) for i in instance_nodes]
     instances = [Instance(used.index(mesh), world[node, :3], name)
                  for mesh, node, name in zip(mesh_ids, instance_nodes, names, strict=True)]
-    materials = [DEFAULT_MATERIAL, *map(_material, root.list("materials"))]
-    animation = Animation(nodes, order, channels, instance_nodes, camera_nodes) if channels else None
-    return Scene(meshes, instances, materials, [camera.camera(world) for camera in camera_nodes], animation, warnings)
+    materials = [DEFAULT_MATERIAL, *GltfMaterials(root, accessors, path.parent, warnings).load()]
+    animation = Animation(nodes, order, channels, instance_nodes, camera_nodes, lights) if channels else None
+    return Scene(meshes, instances, materials, [camera.camera(world) for camera in camera_nodes], animation, warnings,
+                 [light.light(world) for light in lights])

@@ -137,14 +137,20 @@ def _split_glb(data):
     return text, binary
 
 
-def read_gltf_file(path):
+def read_gltf_file(path, supported=()):
     """``(Element, bytes or None)``: the JSON of a .gltf or .glb file, told apart by content, and the binary
     chunk.
+
+    Parameters
+    ----------
+    path : Path
+    supported : sequence of str
+        Extensions that a file may require.
 
     Raises
     ------
     SceneError
-        If the file is cut short, is no JSON, is no glTF 2.x, or requires an extension.
+        If the file is cut short, is no JSON, is no glTF 2.x, or requires an extension that is not supported.
     """
     data, binary = path.read_bytes(), None
     if data[:4] == struct.pack("<I", _GLB_MAGIC):
@@ -157,7 +163,7 @@ def read_gltf_file(path):
     version = asset.text("version") if asset else "unknown"
     if version.split(".")[0] != "2":
         raise SceneError(f"glTF version {version} is not supported; convert it to version 2.0")
-    required = root.data.get("extensionsRequired")
-    if required:
+    required = root.data.get("extensionsRequired") or []
+    if not isinstance(required, list) or any(name not in supported for name in required):
         raise SceneError(f"requires extensions {required}; export without them (no compression)")
     return root, binary

@@ -6,11 +6,19 @@ from pathlib import Path
 from .check import unusable_warnings
 from .error import SceneError
 from .gltf import load_gltf
+from .mirror_room import mirror_room_scene
 from .obj import load_obj
 from .ply import load_ply
 from .room import room_scene
+from .sunflowers import sunflowers_scene
+from .vpl import vpl_scene
+from .walk import walk_scene
 
-__all__ = ["load_scene"]
+__all__ = ["BUILT_IN", "load_scene"]
+
+#: Scenes made in code, by name.
+BUILT_IN = {"room": room_scene, "mirror-room": mirror_room_scene, "vpl": vpl_scene, "walk": walk_scene,
+            "sunflowers": sunflowers_scene}
 
 _LOADERS = {".obj": load_obj, ".ply": load_ply, ".ply.gz": load_ply, ".gltf": load_gltf, ".glb": load_gltf}
 
@@ -21,7 +29,7 @@ def load_scene(path):
     Parameters
     ----------
     path : str or path-like
-        A file ending in .obj, .ply, .ply.gz, .gltf or .glb, or the name ``room`` for the built-in room.
+        A file ending in .obj, .ply, .ply.gz, .gltf or .glb, or a name in :data:`BUILT_IN`.
 
     Raises
     ------
@@ -29,12 +37,12 @@ def load_scene(path):
         If the file is missing, of an unknown format, or broken.
     """
     path = Path(path)
-    if str(path) == "room":
-        return room_scene()
+    if str(path) in BUILT_IN:
+        return BUILT_IN[str(path)]()
     loader = next((load for suffix, load in _LOADERS.items() if path.name.lower().endswith(suffix)), None)
     if loader is None:
-        raise SceneError(f"{path}: unknown scene format; supported are {', '.join(_LOADERS)} "
-                         "and the built-in scene 'room'")
+        raise SceneError(f"{path}: unknown scene format; supported are {', '.join(_LOADERS)} and the built-in scenes "
+                         f"{', '.join(BUILT_IN)}")
     try:
         scene = loader(path)
     except OSError as error:

@@ -15,6 +15,7 @@ import numpy as np
 from .error import SceneError
 from .mtl import load_mtl
 from .scene import DEFAULT_MATERIAL, IDENTITY, Instance, Mesh, Scene
+from .texture import TextureFiles
 
 __all__ = ["load_obj"]
 
@@ -166,8 +167,10 @@ def load_obj(path):
     rows = np.repeat(face_rows, per_face)
 
     materials = [DEFAULT_MATERIAL]
+    textures = TextureFiles(path.parent, warnings, flip=True)
     for name in text.names(b"mtllib")[1]:
-        materials += load_mtl(path.parent, name, warnings)
+        materials += load_mtl(path.parent, name, textures, warnings)
+    warnings += textures.warnings()
     number = {material.name: i for i, material in reversed(list(enumerate(materials)))}
     use_rows, use_names = text.names(b"usemtl")
     for name in dict.fromkeys(use_names):

@@ -1,4 +1,4 @@
-"""Stanford PLY: ascii and binary, plain or gzip-compressed, polygons as fans, vertex colours."""
+"""Stanford PLY: ascii and binary, plain or gzip-compressed, polygons as fans, vertex colours and normals."""
 
 import gzip
 import zlib
@@ -15,6 +15,8 @@ __all__ = ["load_ply"]
 _TYPES = {"char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
           "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
           "double": "f8", "float64": "f8"}
+_NORMALS = ("nx", "ny", "nz")
+_TEXTURE_COORDINATES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -188,6 +190,14 @@ def _materials(columns, element, triangles):
     return materials or [DEFAULT_MATERIAL], ids.reshape(-1).astype(np.int32)
 
 
+def _per_corner(columns, triangles, *names):
+    """Attribute of each corner, float64[T, 3, n], by the first set of columns that is there; None if none is."""
+    for wanted in names:
+        if all(name in columns for name in wanted):
+            return np.nan_to_num(np.stack([columns[name] for name in wanted], axis=1))[triangles]
+    return None
+
+
 def load_ply(path):
     """Scene of a PLY file: one mesh, one instance.
 
@@ -230,5 +240,6 @@ def load_ply(path):
     materials, material_ids = _materials(columns, vertex, triangles)
     vertices = np.stack([columns[name] for name in "xyz"], axis=1)
     name = path.name.split(".")[0]
-    mesh = Mesh(name, vertices, triangles, material_ids)
+    mesh = Mesh(name, vertices, triangles, material_ids, normals=_per_corner(columns, triangles, _NORMALS),
+                uvs=_per_corner(columns, triangles, *_TEXTURE_COORDINATES))
     return Scene([mesh], [Instance(0, IDENTITY, name)], materials)

@@ -1,4 +1,4 @@
-"""The scene in memory: meshes, their instances, materials, cameras and motion."""
+"""The scene in memory: meshes, their instances, materials, lights, cameras and motion."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -9,24 +9,19 @@ import numpy as np
 from .camera import Camera
 from .check import usable_triangles
 from .error import SceneError
+from .light import MAX_LIGHTS, Light
+from .material import DEFAULT_MATERIAL, Material
+from .normals import corner_normals
+from .sky import Sky
+from .texture import Texture
 
-__all__ = ["DEFAULT_MATERIAL", "IDENTITY", "Camera", "Instance", "Material", "Mesh", "Scene", "SceneError"]
+__all__ = ["DEFAULT_MATERIAL", "IDENTITY", "Camera", "Instance", "Light", "Material", "Mesh", "Scene", "SceneError",
+           "Sky", "Texture"]
 
 IDENTITY = np.eye(3, 4)
 
 # Condition number from which the inverse of a 3×3 in float64 has no correct bit left.
 _MAX_CONDITION = 1e14
-
-
-@dataclass(frozen=True)
-class Material:
-    """Look of a surface: its name and its diffuse colour, linear RGB within 0…1."""
-
-    name: str
-    base_color: tuple[float, float, float]
-
-
-DEFAULT_MATERIAL = Material("default", (0.8, 0.8, 0.8))
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +60,11 @@ class Mesh:
         return usable_triangles(self)
 
     @cached_property
+    def shading_normals(self):
+        """float64[T, 3, 3] or None, see :func:`sim.scene.normals.corner_normals`."""
+        return corner_normals(self)
+
+    @cached_property
     def _bounds(self):
         corners = self.vertices[self.triangles[self.usable]].reshape(-1, 3)
         if not len(corners):
@@ -96,7 +96,7 @@ class Instance:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything that is needed to render: meshes, instances, materials, cameras, motion.
+    """Everything that is needed to render: meshes, instances, materials, cameras, motion, lights and sky.
 
     Parameters
     ----------
@@ -106,14 +106,20 @@ class Scene:
     materials : list of Material
     cameras : list of Camera
     animation : Animation, optional
-        Motion of the instances and cameras.
+        Motion of the instances, cameras and lights.
     warnings : list of str
         What was odd in the file and how it was taken.
+    lights : list of Light
+        At most 256; a scene without any is lit from the camera.
+    sky : Sky, optional
+        What rays see that meet nothing, in place of a background colour.
+    ambient : tuple of 3 floats
+        Light that reaches every surface from everywhere, linear RGB.
 
     Raises
     ------
     SceneError
-        If nothing in the scene can be hit, or an instance's transform has no inverse.
+        If nothing in the scene can be hit, an instance's transform has no inverse, or there are too many lights.
     """
 
     meshes: list[Mesh]
@@ -122,8 +128,14 @@ class Scene:
     cameras: list[Camera] = field(default_factory=list)
     animation: object | None = None
     warnings: list[str] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    sky: Sky | None = None
+    ambient: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self):
+        if len(self.lights) > MAX_LIGHTS:
+            raise SceneError(f"scene has {len(self.lights)} lights; the shader has room for {MAX_LIGHTS}; "
+                             "leave some out")
         for number, instance in enumerate(self.instances):
             linear = instance.transform[:, :3]
             if not np.isfinite(instance.transform).all():
@@ -187,7 +199,7 @@ class Scene:
         return self.animation.duration if self.is_animated else 0.0
 
     def at_time(self, t):
-        """The same scene with instances and cameras where they are at time ``t``, in seconds.
+        """The same scene with instances, cameras and lights where they are at time ``t``, in seconds.
 
         Times outside the key frames take the nearest one's value. Meshes are shared, not copied.
 
@@ -198,7 +210,7 @@ class Scene:
         """
         if not self.is_animated:
             return self
-        transforms, cameras = self.animation.pose(t)
+        transforms, cameras, lights = self.animation.pose(t)
         instances = [replace(instance, transform=transform)
                      for instance, transform in zip(self.instances, transforms, strict=True)]
-        return replace(self, instances=instances, cameras=cameras)
+        return replace(self, instances=instances, cameras=cameras, lights=lights or self.lights)

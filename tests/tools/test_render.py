@@ -75,6 +75,40 @@ def test_rtl_report_has_what_tools_rely_on(tmp_path):
     assert "0 pixels differ from the model" in result.output
 
 
+def test_full_shading(tmp_path):
+    report = tmp_path / "report.json"
+    result = run("render", "mirror-room", "-o", tmp_path / "room.png", "--engine", "golden", "--shading", "full",
+                 "--size", "64x48", "--depth", "2", "--report", report)
+    assert result.exit_code == 0, result.output
+    scene = load_scene("mirror-room")
+    golden = render_golden(scene, scene.default_camera(), 64, 48, shading="full", depth=2)
+    assert (np.asarray(Image.open(tmp_path / "room.png")) == golden.color).all()
+    described = json.loads(report.read_text())
+    levels = described["levels"]
+    assert described["rays"] == sum(level["rays"] + level["shadow"] for level in levels)
+    assert len(levels) == 3
+    assert levels[0]["rays"] == 64 * 48
+    assert levels[1]["rays"] == sum(levels[0][kind] for kind in ("reflection", "refraction", "transparency")) > 0
+
+
+def test_a_panorama_as_the_sky(tmp_path):
+    panorama = np.zeros((64, 128, 3), np.uint8)
+    panorama[:] = (10, 90, 200)
+    Image.fromarray(panorama).save(tmp_path / "sky.png")
+    result = run("render", obj(tmp_path, TRIANGLE), "-o", tmp_path / "x.png", "--engine", "golden", "--shading", "full",
+                 "--size", "8x8", "--sky", tmp_path / "sky.png", "--camera", "0,0,5,0,0,9,0,1,0,60")
+    assert result.exit_code == 0, result.output
+    assert (np.asarray(Image.open(tmp_path / "x.png")) == (10, 90, 200)).all()
+
+
+def test_frames_of_the_walk(tmp_path):
+    result = run("render", "walk", "-o", tmp_path / "w.png", "--engine", "golden", "--shading", "full", "--depth", "1",
+                 "--size", "32x24", "--frames", "2")
+    assert result.exit_code == 0, result.output
+    first, second = (np.asarray(Image.open(tmp_path / f"w-000{k}.png")) for k in (0, 1))
+    assert (first != second).mean() > 0.5
+
+
 def obj(tmp_path, text, name="scene.obj"):
     path = tmp_path / name
     path.write_text(text)
@@ -102,7 +136,7 @@ def test_missing_file(tmp_path):
 def test_unknown_format(tmp_path):
     fails(tmp_path, obj(tmp_path, "", "scene.stl"),
           says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb and the "
-               "built-in scene 'room'")
+               "built-in scenes room, mirror-room, vpl, walk, sunflowers")
 
 
 def gltf(tmp_path, *, uri="data.bin", matrix=None, byte_length=36, data=None):
@@ -158,6 +192,15 @@ def test_singular_instance(tmp_path):
     (["--wave", "x.vcd", "--wave-pixel", "600,3"], r"--wave-pixel: 600,3 is outside of the picture of 512x384"),
     (["--view", "3"], r"--view: there is no camera 3, the scene has"),
     (["--frames", "4"], r"nothing moves in this scene; leave --frames out"),
+    (["--shading", "full"], r"--shading full: the engine rtl has the simple shader only; use --engine golden"),
+    (["--shading", "full", "--engine", "model"], r"the engine model has the simple shader only; use --engine golden"),
+    (["--shading", "phong"], r"'phong' is not one of 'simple', 'full'"),
+    (["--depth", "2"], r"--depth is of full shading; use --shading full"),
+    (["--depth", "17", "--shading", "full", "--engine", "golden"], r"17 is not in the range 0<=x<=16"),
+    (["--sky", "none.png"], r"--sky is of full shading; use --shading full"),
+    (["--sky", "none.png", "--shading", "full", "--engine", "golden"], r"--sky: none\.png: No such file or directory"),
+    (["--sky", __file__, "--shading", "full", "--engine", "golden"], r"texture '.*': cannot be read: not a picture of "
+     "a known format"),
     (["--hits", "no/such/folder/h.npz"], r"no/such/folder/h\.npz: there is no folder no/such/folder"),
     (["--chip", "index_width=8"], r"scene needs [\d,]+ kd-tree nodes, more than the 256 that the chip's memory "
      "addresses; leave objects out or build a chip with a wider index_width"),
