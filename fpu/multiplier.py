@@ -58,9 +58,9 @@ class Multiplier(BinaryOperator):
         exp_sum = carry_chain(m, "exponent", (ChainBit.CARRY, Const(1, 1), 0, 0),
                               (ChainBit.ADD, Cat(a.exp, Const(0, 1)), Cat(b.exp, Const(0, 1)), 0))[1:]
         # Zeros take part with a hidden bit; `zero` overrides what comes of it, so the block waits for no logic.
-        s = multiply_exactly(m, step, "multiply", Cat(a.frac, Const(1, 1)), Cat(b.frac, Const(1, 1)), exp_sum=exp_sum,
+        s = multiply_exactly(m, step, "multiply", (Cat(a.frac, Const(1, 1)), Cat(b.frac, Const(1, 1))), exp_sum=exp_sum,
                              zero=zero, inf=inf & ~zero, sign=(a.sign ^ b.sign) & ~(zero & inf))
         above = fmt.exp_width - 1
         exp = Cat(s.exp_sum[:above], s.exp_sum[above:] - 1)[:fmt.exp_width + 2].as_signed()
-        s = SimpleNamespace(sig=s.p, sticky=Const(0, 1), exp=exp, zero=s.zero, inf=s.inf, sign=s.sign)
+        s = SimpleNamespace(sig=s.products[0], sticky=Const(0, 1), exp=exp, zero=s.zero, inf=s.inf, sign=s.sign)
         m.d.comb += self.r.eq(round_and_pack(step, m, s, fmt=fmt, rounding=self.rounding))

@@ -76,33 +76,42 @@ def product_delays(name, a_width, b_width):
             f"{name}_sum": carry_delay(a_width + b_width - _BLOCK_WIDTH)}
 
 
-def multiply_exactly(m, step, name, a, b, **carried):
-    """What is ``carried`` through the steps of :func:`product_delays`, and with it ``p`` = a * b.
+def multiply_exactly(m, step, name, *pairs, **carried):
+    """What is ``carried`` through the steps of :func:`product_delays`, and with it ``products``, one for each pair.
 
-    One block for operands of up to 18 bits, up to four for up to 36.
+    One block for operands of up to 18 bits, up to four for up to 36. All pairs are of the same widths.
     """
-    a, b = Value.cast(a), Value.cast(b)
-    parts = [[value[:_BLOCK_WIDTH], value[_BLOCK_WIDTH:]] for value in (a, b)]
-    products = {}
-    for i, a_part in enumerate(parts[0]):
-        for j, b_part in enumerate(parts[1]):
-            if len(a_part) and len(b_part):
-                m.submodules[f"{name}_{i}{j}"] = product = Product(len(a_part), len(b_part),
-                                                                cycles=step.registers_of_next(1))
-                m.d.comb += [product.a.eq(a_part), product.b.eq(b_part)]
-                products[i, j] = product.p
+    partial = []
+    for index, (a, b) in enumerate(pairs):
+        parts = [[value[:_BLOCK_WIDTH], value[_BLOCK_WIDTH:]] for value in (Value.cast(a), Value.cast(b))]
+        partial.append({})
+        for i, a_part in enumerate(parts[0]):
+            for j, b_part in enumerate(parts[1]):
+                if len(a_part) and len(b_part):
+                    product = Product(len(a_part), len(b_part), cycles=step.registers_of_next(1))
+                    m.submodules[f"{name}_{index}_{i}{j}"] = product
+                    m.d.comb += [product.a.eq(a_part), product.b.eq(b_part)]
+                    partial[-1][i, j] = product.p
     s = step(name, **carried)
-    if len(products) == 1:
-        return SimpleNamespace(**vars(s), p=products[0, 0])
+    if len(partial[0]) == 1:
+        return SimpleNamespace(**vars(s), products=[parts[0, 0] for parts in partial])
+
     # The outer products stand side by side, the inner ones overlap both.
-    inner = [products.get(key, Const(0, 1)) for key in ((0, 1), (1, 0))]
-    width = max(map(len, inner)) + 1
-    inner = [Cat(value, Const(0, width - len(value))) for value in inner]
-    cross = carry_chain(m, f"{name}_cross", (ChainBit.ADD, *inner, 0))
-    outer = Cat(products[0, 0], products.get((1, 1), Const(0, 0)))
-    s = step(f"{name}_cross", s, outer=outer, cross=cross)
-    width = len(a) + len(b) - _BLOCK_WIDTH
-    upper = Cat(s.outer[_BLOCK_WIDTH:], Const(0, width))[:width]
-    upper = carry_chain(m, f"{name}_sum", (ChainBit.ADD, upper, Cat(s.cross, Const(0, width))[:width], 0))
-    s = step(f"{name}_sum", s, p=Cat(s.outer[:_BLOCK_WIDTH], upper))
-    return s
+    sums = {}
+    for index, parts in enumerate(partial):
+        inner = [parts.get(key, Const(0, 1)) for key in ((0, 1), (1, 0))]
+        width = max(map(len, inner)) + 1
+        inner = [Cat(value, Const(0, width - len(value))) for value in inner]
+        sums[f"outer{index}"] = Cat(parts[0, 0], parts.get((1, 1), Const(0, 0)))
+        sums[f"cross{index}"] = carry_chain(m, f"{name}_{index}_cross", (ChainBit.ADD, *inner, 0))
+    s = step(f"{name}_cross", s, **sums)
+    width = sum(len(Value.cast(value)) for value in pairs[0]) - _BLOCK_WIDTH
+    products = {}
+    for index in range(len(pairs)):
+        outer, cross = getattr(s, f"outer{index}"), getattr(s, f"cross{index}")
+        upper = carry_chain(m, f"{name}_{index}_sum", (
+            ChainBit.ADD, *(Cat(value, Const(0, width))[:width] for value in (outer[_BLOCK_WIDTH:], cross)), 0))
+        products[f"product{index}"] = Cat(outer[:_BLOCK_WIDTH], upper)
+    s = step(f"{name}_sum", **{field: getattr(s, field) for field in carried}, **products)
+    return SimpleNamespace(**{field: getattr(s, field) for field in carried},
+                           products=[getattr(s, field) for field in products])

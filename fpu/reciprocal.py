@@ -95,10 +95,10 @@ class Reciprocal(UnaryOperator):
                           frac=a.frac, exp=a.exp, sign=a.sign, zero=is_inf(a), inf=is_zero(a))
         # In (½, 1): the significand rounded down, and what is half a unit above.
         estimate = s.value[-fmt.sig_width:]
-        s = multiply_exactly(m, step, "check", Cat(Const(1, 1), estimate), Cat(s.frac, Const(1, 1)), estimate=estimate,
+        s = multiply_exactly(m, step, "check", (Cat(Const(1, 1), estimate), Cat(s.frac, Const(1, 1))), estimate=estimate,
                              exp=s.exp, sign=s.sign, zero=s.zero, inf=s.inf)
         # Below 1, the product says that 1 / a is above. That goes in as the guard bit: it cannot be in the middle.
-        s = step("side", above=~s.p[2 * fmt.frac_width + 2],
+        s = step("side", above=~s.products[0][2 * fmt.frac_width + 2],
                  **{name: getattr(s, name) for name in ("estimate", "exp", "sign", "zero", "inf")})
         exp = carry_chain(m, "exponent", (ChainBit.CARRY, Const(1, 1), 0, 0),
                           (ChainBit.SUBTRACT, Const(2 * fmt.bias - 1, fmt.exp_width + 2), Cat(s.exp, Const(0, 2)), 0))
@@ -163,21 +163,21 @@ class TableDivider(BinaryOperator):
                           exp=exp, sign=(a.sign ^ b.sign) & ~(zero & inf), zero=zero, inf=inf & ~zero)
         # 1 / b is above a half: that part of the product is a / 2.
         dividend, above_half = Cat(s.a_frac, Const(1, 1)), s.value[3:-1]
-        s = multiply_exactly(m, step, "quotient", dividend, above_half, dividend=dividend,
+        s = multiply_exactly(m, step, "quotient", (dividend, above_half), dividend=dividend,
                              **{name: getattr(s, name) for name in ("b_frac", "exp", "sign", "zero", "inf")})
-        quotient = carry_chain(m, "quotient_sum", (ChainBit.ADD, Cat(s.p[fmt.sig_width + 1:], Const(0, 1)),
+        quotient = carry_chain(m, "quotient_sum", (ChainBit.ADD, Cat(s.products[0][fmt.sig_width + 1:], Const(0, 1)),
                                                    Cat(s.dividend, Const(0, 1)), 0))
         # What is half a unit above the quotient rounded down, whose unit depends on whether it is above 1.
         above_one = quotient[-1]
         half_way = Cat(Const(1, 1), Mux(above_one, quotient[1:], quotient[:-1]))
         s = step("sum", quotient=quotient, half_way=half_way, dividend=s.dividend[:3], b_frac=s.b_frac,
                  exp=s.exp, sign=s.sign, zero=s.zero, inf=s.inf)
-        s = multiply_exactly(m, step, "check", s.half_way, Cat(s.b_frac, Const(1, 1)), dividend=s.dividend,
+        s = multiply_exactly(m, step, "check", (s.half_way, Cat(s.b_frac, Const(1, 1))), dividend=s.dividend,
                              **{name: getattr(s, name) for name in ("quotient", "exp", "sign", "zero", "inf")})
         # The sign of what the product leaves of the dividend, which is small. Its lower bits are never all zero: they
         # borrow one.
         above_one, dividend = s.quotient[-1], Cat(s.dividend, Const(0, 3))
-        rest = Mux(above_one, dividend[:3], Cat(Const(0, 1), dividend[:2])) - s.p[fmt.sig_width:][:3] - 1
+        rest = Mux(above_one, dividend[:3], Cat(Const(0, 1), dividend[:2])) - s.products[0][fmt.sig_width:][:3] - 1
         s = step("side", above=~rest[2], quotient=s.quotient, exp=s.exp, sign=s.sign, zero=s.zero, inf=s.inf)
         # Twice the quotient, with the side as its guard bit: it cannot be in the middle.
         sig = Cat(s.above, Mux(s.quotient[-1], s.above, s.quotient[0]), s.quotient[1:])

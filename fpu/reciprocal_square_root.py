@@ -11,7 +11,7 @@ from .chain import ChainBit, carry_chain
 from .operator import UnaryOperator, is_inf, is_zero
 from .packing import round_and_pack, round_and_pack_delays
 from .pipeline import carry_delay, lut_delay
-from .product import Product, multiply_exactly, product_delays
+from .product import multiply_exactly, product_delays
 from .reciprocal import check_fits_table
 from .rounding import Rounding, emulated, round_nearest
 from .table import LineTable
@@ -97,18 +97,17 @@ class ReciprocalSquareRoot(UnaryOperator):
         estimate = s.value[-fmt.sig_width:]
         half_way = Cat(Const(1, 1), estimate)
         rest = {name: getattr(s, name) for name in ("exp", "sign", "zero", "inf")}
-        s = multiply_exactly(m, step, "square", half_way, half_way, estimate=estimate,
+        s = multiply_exactly(m, step, "square", (half_way, half_way), estimate=estimate,
                              radicand=s.radicand, **rest)
         # From one multiplier block to the next takes all of a clock.
-        s = step("move", s)
-        lower, upper = s.p[:fmt.sig_width + 1], s.p[fmt.sig_width + 1:]
-        m.submodules.check_lower = below = Product(len(lower), len(s.radicand), cycles=step.registers_of_next(1))
-        m.d.comb += [below.a.eq(lower), below.b.eq(s.radicand)]
-        s = multiply_exactly(m, step, "check", upper, s.radicand,
+        square = s.products[0]
+        s = step("move", square=square, **{name: getattr(s, name) for name in ("estimate", "radicand", *rest)})
+        lower, upper = s.square[:fmt.sig_width + 1], s.square[fmt.sig_width + 1:]
+        s = multiply_exactly(m, step, "check", (lower, s.radicand), (upper, s.radicand),
                              **{name: getattr(s, name) for name in ("estimate", *rest)})
         one = 2 * fmt.frac_width + 2
-        product = carry_chain(m, "check_sum", (ChainBit.ADD, s.p[:one + 1],
-                                               Cat(below.p[len(lower):], Const(0, one))[:one + 1], 0))
+        product = carry_chain(m, "check_sum", (ChainBit.ADD, s.products[1][:one + 1],
+                                               Cat(s.products[0][len(lower):], Const(0, one))[:one + 1], 0))
         s = step("sum", exceeds=product[one], **{name: getattr(s, name) for name in ("estimate", *rest)})
         # Unless it exceeds 1, 1 / √a is above. That goes in as the guard bit: it cannot be in the middle.
         s = step("side", above=~s.exceeds, **{name: getattr(s, name) for name in ("estimate", *rest)})

@@ -79,10 +79,10 @@ class LineTable:
         start, slope = rom.data[:self.value_width], rom.data[self.value_width:]
         if not self.offset_width:
             return SimpleNamespace(**vars(s), value=start)
-        s = multiply_exactly(m, step, f"{name}_slope", slope, s.offset, start=start,
+        s = multiply_exactly(m, step, f"{name}_slope", (slope, s.offset), start=start,
                              **{field: value for field, value in vars(s).items() if field != "offset"})
-        fallen = Cat(s.p[self._drop:], Const(0, self.value_width))[:self.value_width]
+        fallen = Cat(s.products[0][self._drop:], Const(0, self.value_width))[:self.value_width]
         value = carry_chain(m, f"{name}_value", (ChainBit.CARRY, Const(1, 1), 0, 0),
                             (ChainBit.SUBTRACT, s.start, fallen, 0))[1:]
-        kept = {field: kept for field, kept in vars(s).items() if field not in ("start", "p")}
+        kept = {field: kept for field, kept in vars(s).items() if field not in ("start", "products")}
         return step(f"{name}_line", value=value, **kept)

@@ -1,0 +1,246 @@
+"""Fused dot product."""
+
+import math
+from types import MappingProxyType, SimpleNamespace
+
+import numpy as np
+from amaranth.hdl import Cat, Const, Mux, Signal
+from amaranth.lib import data
+from amaranth.lib.wiring import In, Out
+
+from .chain import ChainBit, carry_chain
+from .normalise import normalise, normalise_delays
+from .operator import Operator, is_inf, is_zero
+from .packing import round_and_pack, round_and_pack_delays
+from .pipeline import carry_delay, depth_for, lut_delay
+from .product import multiply_exactly, product_delays
+from .rounding import Rounding, emulated, round_nearest, round_truncate
+
+__all__ = ["DotProduct", "dot_product", "dot_product_truncate"]
+
+_LOWEST = -(1 << 40)
+
+
+@emulated
+def _exponent(x):
+    return math.frexp(x)[1] - 1
+
+
+@emulated
+def _exact_sum(params, window, ax, ay, az, bx, by, bz, c):
+    """Sum of the terms cut to the window, as float64, which holds it; NaN where there are both infinities."""
+    highest, infinite = _LOWEST, 0.0
+    for a, b in ((ax, bx), (ay, by), (az, bz), (c, 1.0)):
+        term = a * b
+        if math.isinf(term):
+            infinite += term
+        elif not math.isnan(term) and term != 0.0:
+            highest = max(highest, _exponent(a) + _exponent(b))
+    if infinite != 0.0:
+        return infinite
+    if highest == _LOWEST:
+        return 0.0
+    total = np.int64(0)
+    for a, b in ((ax, bx), (ay, by), (az, bz), (c, 1.0)):
+        term = a * b
+        if not math.isnan(term):
+            # Cut towards zero.
+            total += np.int64(math.ldexp(term, window - highest))
+    return math.ldexp(float(total), highest - window)
+
+
+@emulated
+def dot_product(params, window, ax, ay, az, bx, by, bz, c):
+    """ax·bx + ay·by + az·bz + c as of :class:`DotProduct`, rounded to nearest even."""
+    return round_nearest(params, _exact_sum(params, window, ax, ay, az, bx, by, bz, c))
+
+
+@emulated
+def dot_product_truncate(params, window, ax, ay, az, bx, by, bz, c):
+    """ax·bx + ay·by + az·bz + c as of :class:`DotProduct`, rounded towards zero."""
+    return round_truncate(params, _exact_sum(params, window, ax, ay, az, bx, by, bz, c))
+
+
+class DotProduct(Operator):
+    """r = a₀·b₀ + a₁·b₁ + a₂·b₂ + c, rounded once.
+
+    The products are exact. All four terms are aligned to the one of the highest exponent (of a product: the sum of its
+    factors'), cut towards zero ``window`` bits below that exponent's place, and their sum is rounded. So with the
+    default window the error is up to half a unit in the last place of the result, and of each term that is not the
+    highest up to 2^-window of the highest, which counts only where the terms cancel.
+
+    0·∞ is +0, as a term; infinities of both signs give +0; an exact zero is +0.
+
+    Parameters
+    ----------
+    fmt, latency, rounding
+        See :class:`~fpu.operator.Operator`.
+    window : int or None
+        Bits kept below the highest exponent, from ``frac_width + 2`` to ``2 * frac_width``, which is the default:
+        there a product of that exponent ends.
+    has_addend : bool
+        Whether there is ``c``.
+
+    Members
+    -------
+    a, b : In(ArrayLayout(fmt, 3))
+        Factors.
+    c : In(fmt)
+        Addend, if there is one.
+    r : Out(fmt)
+        Sum, ``latency`` cycles later.
+
+    Raises
+    ------
+    ValueError
+        If ``window`` is outside its limits or ``latency`` negative.
+    """
+
+    #: Compiled emulation by rounding: ``f(fmt.params, window, *a, *b, c)``.
+    emulation = MappingProxyType({Rounding.NEAREST_EVEN: dot_product, Rounding.TRUNCATE: dot_product_truncate})
+
+    def __init__(self, fmt, *, window=None, has_addend=True, latency=None, rounding=Rounding.NEAREST_EVEN):
+        self.window = self.default_window(fmt) if window is None else window
+        self.has_addend = has_addend
+        if not min(fmt.frac_width + 2, 2 * fmt.frac_width) <= self.window <= 2 * fmt.frac_width:
+            raise ValueError(f"Window of a dot product in {fmt} must be between {fmt.frac_width + 2} and "
+                             f"{2 * fmt.frac_width} bits, not {self.window!r}")
+        vector = data.ArrayLayout(fmt, 3)
+        super().__init__(fmt, {"a": In(vector), "b": In(vector), **({"c": In(fmt)} if has_addend else {}),
+                               "r": Out(fmt)}, latency=latency, rounding=rounding)
+
+    @staticmethod
+    def default_window(fmt):
+        """Bits of ``window`` where none are given."""
+        return 2 * fmt.frac_width
+
+    @classmethod
+    def default_latency(cls, fmt):
+        """Latency in cycles where none is given, for a component that need not be there."""
+        return depth_for(cls._delays_of(fmt, cls.default_window(fmt)).values())
+
+    @property
+    def _term_width(self):
+        # A product is in [1, 4).
+        return self.window + 2
+
+    def _delays(self):
+        return self._delays_of(self.fmt, self.window)
+
+    @classmethod
+    def _delays_of(cls, fmt, window):
+        levels = range((window + 1).bit_length())
+        return {
+            **product_delays("multiply", fmt.sig_width, fmt.sig_width),
+            "pairs": carry_delay(fmt.exp_width + 1) + lut_delay(1),
+            "highest": carry_delay(fmt.exp_width + 1) + lut_delay(1),
+            "distance": carry_delay(fmt.exp_width + 1) + lut_delay(1),
+            **{f"align_{level}": lut_delay(1.2) for level in levels[::-1]},
+            "sum_pairs": carry_delay(window + 4), "sum": carry_delay(window + 5),
+            "magnitude": carry_delay(window + 6),
+            **normalise_delays(window + 5),
+            **round_and_pack_delays(fmt),
+        }
+
+    def _compute(self, m, step):
+        fmt = self.fmt
+        terms = [(a.sign ^ b.sign, is_zero(a) | is_zero(b), is_inf(a) | is_inf(b)) for a, b in self._factors()]
+        # Exponents of products, with twice the bias; that of a zero must not be the highest.
+        exps = []
+        for index, (a, b) in enumerate(self._factors()):
+            exp = carry_chain(m, f"exponent_{index}", (
+                ChainBit.ADD, Cat(a.exp, Const(0, 1)), Cat(b.exp, Const(0, 1)), 0))
+            exps.append(Mux(terms[index][1], 0, exp))
+        if self.has_addend:
+            terms.append((self.c.sign, is_zero(self.c), is_inf(self.c)))
+            exps.append(Mux(is_zero(self.c), 0, Cat(self.c.exp, Const(0, 1)) + fmt.bias)[:fmt.exp_width + 1])
+        live = range(len(terms))
+        plus_inf = Cat(inf & ~zero & ~sign for sign, zero, inf in terms).any()
+        minus_inf = Cat(inf & ~zero & sign for sign, zero, inf in terms).any()
+        s = multiply_exactly(
+            m, step, "multiply", *((Cat(a.frac, Const(1, 1)), Cat(b.frac, Const(1, 1))) for a, b in self._factors()),
+            inf=plus_inf ^ minus_inf, invalid=plus_inf & minus_inf, inf_sign=minus_inf,
+            **({"addend": self.c.frac} if self.has_addend else {}),
+            **{f"exp{index}": exps[index] for index in live},
+            **{f"sign{index}": terms[index][0] for index in live},
+            **{f"zero{index}": terms[index][1] for index in live})
+        significands = list(s.products)
+        if self.has_addend:
+            significands.append(Cat(Const(0, fmt.frac_width), s.addend, Const(1, 2))[:2 * fmt.sig_width])
+        common = {name: getattr(s, name) for name in ("inf", "invalid", "inf_sign")}
+        common |= {f"sign{index}": getattr(s, f"sign{index}") for index in live}
+        # Cut to the window; zeros have no hidden bit.
+        below = 2 * fmt.frac_width - self.window
+        moved = {f"term{index}": Mux(getattr(s, f"zero{index}"), 0, significands[index][below:]) for index in live}
+        moved |= {f"exp{index}": getattr(s, f"exp{index}") for index in live}
+
+        pairs = [self._higher(m, f"higher_{low}", *(getattr(s, f"exp{index}") for index in live[low:low + 2]))
+                 for low in live[::2]]
+        s = step("pairs", **common, **moved, **{f"pair{index}": pair for index, pair in enumerate(pairs)})
+        carried = [*common, *moved]
+        s = step("highest", highest=self._higher(m, "highest", *(getattr(s, f"pair{i}") for i in range(len(pairs)))),
+                 **{name: getattr(s, name) for name in carried})
+        levels = range((self.window + 1).bit_length())
+        distances = {}
+        for index in live:
+            distance = carry_chain(m, f"distance_{index}", (ChainBit.CARRY, Const(1, 1), 0, 0), (
+                ChainBit.SUBTRACT, s.highest, getattr(s, f"exp{index}"), 0))[1:]
+            # From 2^levels on nothing is left; which is said by all ones, being as far.
+            far = distance[len(levels):].any()
+            distances[f"distance{index}"] = distance[:len(levels)] | far.replicate(len(levels))
+        kept = [*common, *(f"term{index}" for index in live)]
+        s = step("distance", highest=s.highest, **distances, **{name: getattr(s, name) for name in kept})
+        for level in levels[::-1]:
+            shifted = {}
+            for index in live:
+                term, distance = getattr(s, f"term{index}"), getattr(s, f"distance{index}")
+                shifted[f"term{index}"] = Mux(distance[level], term >> (1 << level), term)[:self._term_width]
+            s = step(f"align_{level}", **vars(s) | shifted)
+        self._add_and_round(m, step, s)
+
+    def _factors(self):
+        return [(self.a[index], self.b[index]) for index in range(3)]
+
+    @staticmethod
+    def _higher(m, name, first, second=None):
+        """The higher of two exponents."""
+        if second is None:
+            return first
+        below = carry_chain(m, name, (ChainBit.COMPARE, first, second, 0), (ChainBit.ADD, Const(0, 1), 0, 0))[-1]
+        return Mux(below, second, first)
+
+    def _add_and_round(self, m, step, s):
+        """Sum of ``s.term0`` … with their signs, made positive, normalised and rounded."""
+        fmt = self.fmt
+        zero = Const(0, 1)
+        terms = [(getattr(s, f"term{index}"), getattr(s, f"sign{index}")) for index in range(3 + self.has_addend)]
+        if not self.has_addend:
+            terms.append((Const(0, self._term_width), zero))
+        width = self._term_width + 3
+        rest = {name: getattr(s, name) for name in ("highest", "inf", "invalid", "inf_sign")}
+        # -x - y = -(x + y): the sign of the first of a pair is that of its sum, and the second is added or taken away.
+        pairs = {}
+        for pair in range(2):
+            (x, x_sign), (y, y_sign) = terms[2 * pair:2 * pair + 2]
+            total = carry_chain(m, f"pair_{pair}", (ChainBit.CARRY, x_sign ^ y_sign, 0, 0), (
+                ChainBit.ADD, Cat(x, Const(0, 2)), Cat(y, Const(0, 2)), x_sign ^ y_sign))[1:]
+            pairs |= {f"total{pair}": total, f"total_sign{pair}": x_sign}
+        s = step("sum_pairs", **rest, **pairs)
+        x, y = (Cat(total, total[-1].replicate(width - len(total))) for total in (s.total0, s.total1))
+        differ = s.total_sign0 ^ s.total_sign1
+        total = carry_chain(m, "total", (ChainBit.CARRY, differ, 0, 0), (ChainBit.ADD, x, y, differ))[1:]
+        s = step("sum", total=total, total_sign=s.total_sign0, **{name: getattr(s, name) for name in rest})
+        negative = s.total[-1]
+        magnitude = carry_chain(m, "magnitude", (ChainBit.CARRY, negative, 0, 0), (
+            ChainBit.ADD, Const(0, width), s.total, negative))[1:]
+        s = step("magnitude", magnitude=magnitude, negative=zero, sign=s.total_sign ^ negative,
+                 **{name: getattr(s, name) for name in rest})
+        s = normalise(step, s)
+        cancelled = ~(s.sig[-2:] | s.shifted[-2:]).any()
+        # The upper place counts 2^(highest + 4), and the highest exponent has twice the bias.
+        exp = Signal(range(-(1 << fmt.exp_width + 2), 1 << fmt.exp_width + 2))
+        m.d.comb += exp.eq(s.highest + (3 - fmt.bias))
+        s = SimpleNamespace(**vars(s) | {
+            "exp": exp, "sticky": zero, "zero": s.invalid | ~s.inf & cancelled,
+            "sign": Mux(s.inf, s.inf_sign, s.sign & ~cancelled & ~s.invalid)})
+        m.d.comb += self.r.eq(round_and_pack(step, m, s, fmt=fmt, rounding=self.rounding))
