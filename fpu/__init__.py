@@ -1,11 +1,13 @@
 """Floating-point arithmetic: formats, pipelined operators, their bit-exact emulation, and datapaths made of them."""
 
 from .adder import Adder, Subtractor
+from .choice import Maximum, Minimum
 from .comparator import Comparator
 from .convert import FloatToInt, IntToFloat
 from .datapath import Datapath
 from .delay import Delay
 from .divider import Divider
+from .dot_product import DotProduct
 from .format import FloatFormat
 from .multiplier import Multiplier
 from .reciprocal import Reciprocal, TableDivider
@@ -14,6 +16,7 @@ from .rounding import Rounding
 from .square_root import SquareRoot
 
 __all__ = [
-    "Adder", "Comparator", "Datapath", "Delay", "Divider", "FloatFormat", "FloatToInt", "IntToFloat", "Multiplier",
-    "Reciprocal", "ReciprocalSquareRoot", "Rounding", "SquareRoot", "Subtractor", "TableDivider",
+    "Adder", "Comparator", "Datapath", "Delay", "Divider", "DotProduct", "FloatFormat", "FloatToInt", "IntToFloat",
+    "Maximum", "Minimum", "Multiplier", "Reciprocal", "ReciprocalSquareRoot", "Rounding", "SquareRoot",
+    "Subtractor", "TableDivider",
 ]

@@ -134,8 +134,8 @@ class DotProduct(Operator):
             **product_delays("multiply", fmt.sig_width, fmt.sig_width),
             "pairs": carry_delay(fmt.exp_width + 1) + lut_delay(1),
             "highest": carry_delay(fmt.exp_width + 1) + lut_delay(1),
-            "distance": carry_delay(fmt.exp_width + 1) + lut_delay(1),
-            **{f"align_{level}": lut_delay(1.2) for level in levels[::-1]},
+            "distance": carry_delay(fmt.exp_width + 1) + lut_delay(2),
+            **{f"align_{level}": lut_delay(1.3) for level in levels[::-1]},
             "sum_pairs": carry_delay(window + 4), "sum": carry_delay(window + 5),
             "magnitude": carry_delay(window + 6),
             **normalise_delays(window + 5),
@@ -155,11 +155,10 @@ class DotProduct(Operator):
             terms.append((self.c.sign, is_zero(self.c), is_inf(self.c)))
             exps.append(Mux(is_zero(self.c), 0, Cat(self.c.exp, Const(0, 1)) + fmt.bias)[:fmt.exp_width + 1])
         live = range(len(terms))
-        plus_inf = Cat(inf & ~zero & ~sign for sign, zero, inf in terms).any()
-        minus_inf = Cat(inf & ~zero & sign for sign, zero, inf in terms).any()
         s = multiply_exactly(
             m, step, "multiply", *((Cat(a.frac, Const(1, 1)), Cat(b.frac, Const(1, 1))) for a, b in self._factors()),
-            inf=plus_inf ^ minus_inf, invalid=plus_inf & minus_inf, inf_sign=minus_inf,
+            plus_inf=Cat(inf & ~zero & ~sign for sign, zero, inf in terms),
+            minus_inf=Cat(inf & ~zero & sign for sign, zero, inf in terms),
             **({"addend": self.c.frac} if self.has_addend else {}),
             **{f"exp{index}": exps[index] for index in live},
             **{f"sign{index}": terms[index][0] for index in live},
@@ -167,7 +166,8 @@ class DotProduct(Operator):
         significands = list(s.products)
         if self.has_addend:
             significands.append(Cat(Const(0, fmt.frac_width), s.addend, Const(1, 2))[:2 * fmt.sig_width])
-        common = {name: getattr(s, name) for name in ("inf", "invalid", "inf_sign")}
+        plus_inf, minus_inf = s.plus_inf.any(), s.minus_inf.any()
+        common = {"inf": plus_inf ^ minus_inf, "invalid": plus_inf & minus_inf, "inf_sign": minus_inf}
         common |= {f"sign{index}": getattr(s, f"sign{index}") for index in live}
         # Cut to the window; zeros have no hidden bit.
         below = 2 * fmt.frac_width - self.window

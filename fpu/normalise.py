@@ -9,11 +9,20 @@ from .pipeline import lut_delay
 __all__ = ["normalise", "normalise_delays"]
 
 
+#: From 2^5 places on, one step does not both look at them and move the others.
+_WIDE_LEVEL = 5
+
+
 def normalise_delays(width):
     """Delays of the steps of :func:`normalise` on ``width`` bits."""
     # A tree of tables that looks at 2^level bits, and the one that shifts; the last step shifts in the rounding.
-    levels = _normalise_levels(width)
-    return {f"normalise_{level}": lut_delay((level + 1) // 2 + (level != levels[-1])) for level in levels}
+    levels, delays = _normalise_levels(width), {}
+    for level in levels:
+        if level >= _WIDE_LEVEL:
+            delays[f"detect_{level}"] = lut_delay((level + 1) // 2)
+        delays[f"normalise_{level}"] = lut_delay((0 if level >= _WIDE_LEVEL else (level + 1) // 2)
+                                                 + (level != levels[-1]))
+    return delays
 
 
 def _normalise_levels(width):
@@ -34,6 +43,9 @@ def normalise(step, s):
         # -x = ~x + 1: the ones that are shifted in lead the 1, which the rounding adds, to where it belongs.
         magnitude = s.magnitude ^ complement.replicate(width)
         clear = ~magnitude[-places:].any()
+        if level >= _WIDE_LEVEL:
+            s = step(f"detect_{level}", s, magnitude=magnitude, clear=clear)
+            magnitude, clear = s.magnitude, s.clear
         shifted = Cat(s.negative.replicate(places), magnitude[:-places])
         halvings = Cat(clear, s.halvings)
         if level == levels[-1]:

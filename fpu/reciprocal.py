@@ -95,8 +95,8 @@ class Reciprocal(UnaryOperator):
                           frac=a.frac, exp=a.exp, sign=a.sign, zero=is_inf(a), inf=is_zero(a))
         # In (½, 1): the significand rounded down, and what is half a unit above.
         estimate = s.value[-fmt.sig_width:]
-        s = multiply_exactly(m, step, "check", (Cat(Const(1, 1), estimate), Cat(s.frac, Const(1, 1))), estimate=estimate,
-                             exp=s.exp, sign=s.sign, zero=s.zero, inf=s.inf)
+        s = multiply_exactly(m, step, "check", (Cat(Const(1, 1), estimate), Cat(s.frac, Const(1, 1))),
+                             estimate=estimate, exp=s.exp, sign=s.sign, zero=s.zero, inf=s.inf)
         # Below 1, the product says that 1 / a is above. That goes in as the guard bit: it cannot be in the middle.
         s = step("side", above=~s.products[0][2 * fmt.frac_width + 2],
                  **{name: getattr(s, name) for name in ("estimate", "exp", "sign", "zero", "inf")})
