@@ -28,7 +28,7 @@ def _compiled(emulation, exact, arity):
     exact = numba.njit(error_model="numpy")(exact)
 
     @numba.njit(error_model="numpy")
-    def sweep(params, operands):
+    def sweep(params, constants, operands):
         drop, min_normal, max_finite = params
         worst, total, count = 0.0, 0.0, 0
         for index in range(len(operands)):
@@ -36,7 +36,7 @@ def _compiled(emulation, exact, arity):
             wanted = exact(*row)
             if min_normal <= abs(wanted) <= max_finite:
                 _, exponent = math.frexp(wanted)
-                error = math.ldexp(abs(emulation(params, *row) - wanted), 53 - drop - exponent)
+                error = math.ldexp(abs(emulation(params, *constants, *row) - wanted), 53 - drop - exponent)
                 worst = max(worst, error)
                 total += error
                 count += 1
@@ -101,6 +101,7 @@ def measure_error(entry, fmt, *, rounding):
     emulation = entry.operator.emulation[rounding]
     arity = len(inspect.signature(entry.exact).parameters)
     sweep = _compiled(emulation, entry.exact, arity)
+    constants = entry.constants(fmt)
     rng = np.random.default_rng(1)
     if entry.int_width is not None:
         special = []
@@ -110,8 +111,8 @@ def measure_error(entry, fmt, *, rounding):
         mean_over = [_uniform(fmt, arity, rng)] if arity > 1 else (_all_significands(fmt, odd) for odd in (0, 1))
     worst, samples, total, averaged = 0.0, 0, 0.0, 0
     for operands in special:
-        worst, _, samples = sweep(fmt.params, operands)
+        worst, _, samples = sweep(fmt.params, constants, operands)
     for operands in mean_over:
-        largest, added, count = sweep(fmt.params, operands)
+        largest, added, count = sweep(fmt.params, constants, operands)
         worst, total, averaged = max(worst, largest), total + added, averaged + count
     return UlpError(worst, total / averaged if averaged else 0.0, samples + averaged)

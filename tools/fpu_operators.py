@@ -1,6 +1,7 @@
 """The operators that are characterised, and what each would compute without rounding."""
 
 import inspect
+import math
 from dataclasses import dataclass, field
 
 import fpu
@@ -25,12 +26,15 @@ class Entry:
         More keyword arguments for the class.
     int_width : int or None
         Width of the operand, if that is an integer.
+    constants : callable
+        Of a format, what the emulation takes between its parameters and the operands.
     """
 
     operator: type
     exact: object = None
     parameters: dict = field(default_factory=dict)
     int_width: int | None = None
+    constants: object = lambda fmt: ()
 
     @property
     def name(self):
@@ -53,7 +57,6 @@ class Entry:
         rounded = {"rounding": rounding} if len(self.roundings) > 1 else {}
         return self.operator(fmt, latency=latency, **rounded, **self.parameters)
 
-
     def default_latency(self, fmt):
         """Latency that the class chooses for a format.
 
@@ -65,14 +68,31 @@ class Entry:
         return self.build(fmt).latency
 
 
+def _dot(ax, ay, az, bx, by, bz, c):
+    # Knuth's two-sum: what float64 loses of each sum is added at the end.
+    total, lost = c, 0.0
+    for product in (ax * bx, ay * by, az * bz):
+        both = total + product
+        part = both - total
+        lost += (total - (both - part)) + (product - part)
+        total = both
+    return total + lost
+
+
 _INT = {"int_width": 24}
 
+# A subtractor is an adder but for one sign, a maximum a minimum.
 OPERATORS = {entry.name: entry for entry in (
     Entry(operator=fpu.Adder, exact=lambda a, b: a + b),
-    Entry(operator=fpu.Subtractor, exact=lambda a, b: a - b),
     Entry(operator=fpu.Multiplier, exact=lambda a, b: a * b),
     Entry(operator=fpu.Divider, exact=lambda a, b: a / b),
     Entry(operator=fpu.Comparator),
+    Entry(operator=fpu.TableDivider, exact=lambda a, b: a / b),
+    Entry(operator=fpu.Reciprocal, exact=lambda a: 1 / a),
+    Entry(operator=fpu.SquareRoot, exact=lambda a: math.sqrt(a)),
+    Entry(operator=fpu.ReciprocalSquareRoot, exact=lambda a: 1 / math.sqrt(a)),
+    Entry(operator=fpu.DotProduct, exact=_dot, constants=lambda fmt: (fpu.DotProduct.default_window(fmt),)),
+    Entry(operator=fpu.Minimum, exact=lambda a, b: min(a, b)),
     Entry(operator=fpu.IntToFloat, exact=lambda i: i, parameters=_INT, **_INT),
     Entry(operator=fpu.FloatToInt, parameters=_INT),
 )}

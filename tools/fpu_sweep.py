@@ -21,7 +21,7 @@ DEFAULT_FORMAT = FloatFormat(7, 16)
 FORMATS = tuple(map(FloatFormat.parse, (
     "5.8", "5.10", "6.12", "6.14", "7.12", "7.14", "7.16", "7.18", "7.20", "8.23")))
 #: Latencies beyond the default that are measured too.
-BEYOND = 3
+BEYOND = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,10 +50,16 @@ class Point:
                               name=self.title)
 
 
+def _latencies(default):
+    """Each up to a few, further on every second, and around the default."""
+    few = min(4, default + BEYOND)
+    return sorted({*range(few + 1), *range(few, default + BEYOND + 1, 2), default})
+
+
 def sweep(entry):
     """Points of an operator: latencies, grades, formats, roundings, each varied from the default alone."""
     default = entry.default_latency(DEFAULT_FORMAT)
-    points = [Point(entry=entry, fmt=DEFAULT_FORMAT, latency=latency) for latency in range(default + BEYOND + 1)]
+    points = [Point(entry=entry, fmt=DEFAULT_FORMAT, latency=latency) for latency in _latencies(default)]
     points += [Point(entry=entry, fmt=DEFAULT_FORMAT, latency=latency, grade=8) for latency in (0, default)]
     for fmt in FORMATS:
         try:
