@@ -98,6 +98,13 @@ class Circuit(wiring.Component):
             m.d.comb += getattr(self, name).eq(signals[node, datapath.latency_of(name)])
         return m
 
+    @staticmethod
+    def _ports(node, unit):
+        """What takes the operands of a node."""
+        if node.op == "dot":
+            return [*unit.a, *unit.b, *([unit.c] if unit.has_addend else [])]
+        return [unit.a, unit.b] if len(node.operands) == 2 else [unit.a]
+
     def _build(self, m, node, operands, *, name):
         if node.op == "input":
             return getattr(self, node.payload)
@@ -112,7 +119,7 @@ class Circuit(wiring.Component):
                 value = delay.o
             m.d.comb += Value.cast(signal).eq(value)
         else:
-            m.submodules[name] = unit = self.datapath.operator(node.op)
-            m.d.comb += [unit.a.eq(operands[0]), unit.b.eq(operands[1])]
+            m.submodules[name] = unit = self.datapath.operator(node)
+            m.d.comb += [port.eq(operand) for port, operand in zip(self._ports(node, unit), operands, strict=True)]
             m.d.comb += signal.eq(Cat(unit.lt, unit.eq, unit.gt) if node.op == "compare" else unit.r)
         return signal

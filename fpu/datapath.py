@@ -2,24 +2,31 @@
 
 from collections import Counter
 from functools import cached_property
+from inspect import signature
 
 import numpy as np
 
 from .adder import Adder, Subtractor
 from .circuit import Circuit
 from .comparator import Comparator
+from .depth import cheapest_latency
 from .divider import Divider
+from .dot_product import DotProduct
 from .graph import Graph
 from .kernel import compile_kernel
 from .multiplier import Multiplier
+from .reciprocal import Reciprocal
+from .reciprocal_square_root import ReciprocalSquareRoot
 from .rounding import Rounding
+from .square_root import SquareRoot
 
 __all__ = ["Datapath"]
 
 
 #: Operators that the graph instantiates, by node operation, and the name under which they are counted and timed.
-OPERATORS = {"add": Adder, "sub": Subtractor, "mul": Multiplier, "div": Divider, "compare": Comparator}
-COUNTED_AS = {"add": "add", "sub": "add", "mul": "mul", "div": "div", "compare": "cmp"}
+OPERATORS = {"add": Adder, "sub": Subtractor, "mul": Multiplier, "div": Divider, "compare": Comparator,
+             "rec": Reciprocal, "sqrt": SquareRoot, "rsqrt": ReciprocalSquareRoot, "dot": DotProduct}
+COUNTED_AS = {op: {"sub": "add", "compare": "cmp"}.get(op, op) for op in OPERATORS}
 
 
 class Datapath(Graph):
@@ -32,42 +39,79 @@ class Datapath(Graph):
     fmt : FloatFormat
         Format of all floats.
     latencies : dict from str to int
-        Latency of ``"add"`` (also subtraction), ``"mul"``, ``"div"``, ``"cmp"`` and ``"select"``, in cycles. Missing
-        ones are the operators' own defaults, none for ``"select"``.
+        Latency of ``"add"`` (also subtraction), ``"mul"``, ``"div"``, ``"cmp"``, ``"rec"``, ``"sqrt"``, ``"rsqrt"``,
+        ``"dot"`` and ``"select"``, in cycles. Missing ones are the operators' own defaults, or what ``clock_mhz`` asks
+        for; none for ``"select"``.
     rounding : Rounding
-        How all results are rounded.
+        How all results are rounded, where there is a choice.
+    operators : dict from str to type
+        Other classes for some of the operations, such as ``{"div": TableDivider}``.
+    window : int or None
+        Of dot products, see :class:`~fpu.dot_product.DotProduct`.
+    clock_mhz : float or None
+        Clock that each operator alone is to reach on an ECP5 of grade 6: latencies that are not given are the cheapest
+        of those that do, as measured (see :func:`~fpu.depth.cheapest_latency`).
 
     Raises
     ------
     ValueError
-        If an operator is unknown, or a name is not an identifier or used twice.
+        If an operator is unknown or not there in the format, none of its depths reaches ``clock_mhz``, or a name is not
+        an identifier or used twice.
     TypeError
         If a float is given where a flag is expected, or the other way round.
     """
 
-    def __init__(self, fmt, *, latencies=None, rounding=Rounding.NEAREST_EVEN):
-        latencies = dict(latencies or {})
+    def __init__(self, fmt, *, latencies=None, rounding=Rounding.NEAREST_EVEN, operators=None, window=None,
+                 clock_mhz=None):
+        latencies, operators = dict(latencies or {}), dict(operators or {})
         known = {*COUNTED_AS.values(), "select"}
         if not latencies.keys() <= known:
             raise ValueError(f"Latencies may be given for {', '.join(sorted(known))}, "
                              f"not for {', '.join(sorted(latencies.keys() - known))}")
+        if not operators.keys() <= OPERATORS.keys():
+            raise ValueError(f"Operators may be given for {', '.join(sorted(OPERATORS))}, "
+                             f"not for {', '.join(sorted(operators.keys() - OPERATORS.keys()))}")
         self.rounding = Rounding(rounding)
-        super().__init__(fmt, latencies={"select": latencies.get("select", 0)} | {
-            op: latencies.get(name, OPERATORS[op].default_latency(fmt)) for op, name in COUNTED_AS.items()})
+        self.window = DotProduct.default_window(fmt) if window is None else window
+        self.clock_mhz = clock_mhz
+        self._operators = OPERATORS | operators
+        super().__init__(fmt, latencies={"select": latencies.get("select", 0)})
+        self._given = latencies
 
-    def operator(self, op):
-        """New component for the nodes whose operation is ``op``."""
-        rounding = {} if op == "compare" else {"rounding": self.rounding}
-        return OPERATORS[op](self.fmt, latency=self._latencies[op], **rounding)
+    def latency_of_operator(self, op):
+        """Cycles that the nodes whose operation is ``op`` take."""
+        if op not in self._operators:
+            return super().latency_of_operator(op)
+        if op not in self._latencies:
+            given = self._given.get(COUNTED_AS[op])
+            if given is None and self.clock_mhz is None:
+                given = self._operators[op].default_latency(self.fmt)
+            elif given is None:
+                given = cheapest_latency(self._operators[op], self.fmt, clock_mhz=self.clock_mhz)
+            self._latencies[op] = given
+        return self._latencies[op]
+
+    def operator(self, node):
+        """New component for a node that takes one."""
+        cls, parameters = self._operators[node.op], {}
+        if "rounding" in signature(cls).parameters:
+            parameters["rounding"] = self.rounding
+        if node.op == "dot":
+            parameters |= {"window": self.window, "has_addend": len(node.operands) == 7}
+        return cls(self.fmt, latency=self.latency_of_operator(node.op), **parameters)
 
     def emulation(self, op):
         """Compiled function for the nodes whose operation is ``op``, if it takes one."""
-        return getattr(OPERATORS.get(op), "emulation", {}).get(self.rounding)
+        emulations = getattr(self._operators.get(op), "emulation", {})
+        # What cannot be told how to round rounds to nearest even.
+        return emulations.get(self.rounding, emulations.get(Rounding.NEAREST_EVEN))
 
     def cost(self):
-        """Numbers of ``"add"`` (with subtractors), ``"mul"``, ``"div"`` and ``"cmp"``; all else is wires and tables."""
+        """Numbers of ``"add"`` (with subtractors), ``"mul"``, ``"div"`` and ``"cmp"``, and of the other operators that
+        there are; all else is wires and tables."""
         counts = Counter(COUNTED_AS.get(node.op) for node in self.nodes)
-        return {name: counts[name] for name in dict.fromkeys(COUNTED_AS.values())}
+        always = "add", "mul", "div", "cmp"
+        return {name: counts[name] for name in dict.fromkeys(COUNTED_AS.values()) if name in always or counts[name]}
 
     def component(self):
         """Pipelined hardware: see :class:`~fpu.circuit.Circuit`."""

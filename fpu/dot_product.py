@@ -115,9 +115,9 @@ class DotProduct(Operator):
         return 2 * fmt.frac_width
 
     @classmethod
-    def default_latency(cls, fmt):
+    def default_latency(cls, fmt, *, stage_delay=None):
         """Latency in cycles where none is given, for a component that need not be there."""
-        return depth_for(cls._delays_of(fmt, cls.default_window(fmt)).values())
+        return depth_for(cls._delays_of(fmt, cls.default_window(fmt)).values(), stage_delay=stage_delay)
 
     @property
     def _term_width(self):

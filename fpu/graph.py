@@ -128,6 +128,22 @@ class Graph:
         """a / b"""
         return self._node("div", a, b)
 
+    def reciprocal(self, a):
+        """1 / a"""
+        return self._node("rec", a)
+
+    def sqrt(self, a):
+        """√a, +0 below zero"""
+        return self._node("sqrt", a)
+
+    def reciprocal_sqrt(self, a):
+        """1 / √a, +0 below zero"""
+        return self._node("rsqrt", a)
+
+    def dot(self, a, b, c=None):
+        """a·b + c of two vectors and a float, if there is one, rounded once"""
+        return self._node("dot", *a, *b, *(() if c is None else (c,)))
+
     def neg(self, a):
         """-a, also of zero"""
         return self._node("neg", a)
@@ -216,9 +232,14 @@ class Graph:
         if (op, operands) not in self._nodes:
             start = max((operand.arrival or 0 for operand in operands), default=0)
             constant = all(operand.arrival is None for operand in operands)
-            arrival = None if constant and not self._latencies.get(op) else start + self._latencies.get(op, 0)
+            latency = self.latency_of_operator(op)
+            arrival = None if constant and not latency else start + latency
             self._nodes[op, operands] = Node(op, operands, is_flag, arrival, start)
         return self._nodes[op, operands]
+
+    def latency_of_operator(self, op):
+        """Cycles that the nodes whose operation is ``op`` take."""
+        return self._latencies.get(op, 0)
 
     # What is known of it
 

@@ -72,9 +72,9 @@ class FloatOperator(Operator):
     """Operator on floats whose delays depend on their format alone."""
 
     @classmethod
-    def default_latency(cls, fmt):
+    def default_latency(cls, fmt, *, stage_delay=None):
         """Latency in cycles where none is given, for a component that need not be there."""
-        return depth_for(cls._step_delays(fmt).values())
+        return depth_for(cls._step_delays(fmt).values(), stage_delay=stage_delay)
 
     @classmethod
     def _step_delays(cls, fmt):

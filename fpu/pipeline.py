@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 from amaranth.hdl import Signal
 
-__all__ = ["Pipeline", "balance", "carry_delay", "depth_for", "digit_delay", "lut_delay"]
+__all__ = ["Pipeline", "balance", "carry_delay", "depth_for", "digit_delay", "lut_delay",
+           "stage_delay_at"]
 
 
 # Of an ECP5 of speed grade 6, in ns, each with the routing before it.
@@ -13,8 +14,14 @@ _CARRY_ENTRY_DELAY = 2.0
 _CARRY_BIT_DELAY = 0.035
 #: One net to all places of a carry chain.
 _FAN_OUT_DELAY = 0.5
-#: What a clock of 175 MHz leaves to logic between two registers.
-_STAGE_DELAY = 5.2
+# Into and out of registers
+_REGISTER_DELAY = 0.5
+_DEFAULT_CLOCK_MHZ = 175
+
+
+def stage_delay_at(clock_mhz):
+    """What a clock leaves to logic between two registers, in ns."""
+    return 1e3 / clock_mhz - _REGISTER_DELAY
 
 
 def lut_delay(levels):
@@ -65,8 +72,13 @@ def balance(weights, *, latency):
     return registers
 
 
-def depth_for(weights, *, stage_delay=_STAGE_DELAY):
-    """Fewest registers, the last at the output, with which no stage of several steps is slower than ``stage_delay``."""
+def depth_for(weights, *, stage_delay=None):
+    """Fewest registers, the last at the output, with which no stage of several steps is slower than ``stage_delay``.
+
+    By default that is what a clock of 175 MHz leaves.
+    """
+    if stage_delay is None:
+        stage_delay = stage_delay_at(_DEFAULT_CLOCK_MHZ)
     depth, stage = 1, 0
     for weight in weights:
         if stage and stage + weight > stage_delay:

@@ -82,6 +82,7 @@ class Reciprocal(UnaryOperator):
 
     @classmethod
     def _table(cls, fmt):
+        check_fits_table(fmt)
         return _reciprocals(fmt.frac_width, half_unit=0.0)
 
     @classmethod
@@ -142,6 +143,7 @@ class TableDivider(BinaryOperator):
 
     @classmethod
     def _table(cls, fmt):
+        check_fits_table(fmt)
         return _reciprocals(fmt.frac_width, half_unit=2.0 ** -(fmt.frac_width + 4))
 
     @classmethod

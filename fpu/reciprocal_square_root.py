@@ -77,6 +77,7 @@ class ReciprocalSquareRoot(UnaryOperator):
 
     @classmethod
     def _step_delays(cls, fmt):
+        check_fits_table(fmt)
         width = fmt.sig_width + 1
         return {**_roots(fmt.frac_width).delays("estimate"),
                 **product_delays("square", width, width), "move": lut_delay(2),

@@ -1,17 +1,22 @@
 """Datapaths: hardware, model, kernel and cost of the same graph agree."""
 
+import json
+
 import numba
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fpu import Datapath, FloatFormat, Rounding
+from fpu import Adder, Datapath, FloatFormat, Rounding, Subtractor, TableDivider
+from fpu import depth as fpu_depth
+from fpu.depth import cheapest_latency
+from fpu.graph import Vector
 from tests.bench import simulate
 from tests.fpu import clocked
 
 FMT = FloatFormat(4, 5)
-UNARY = ["neg", "abs"]
+UNARY = ["neg", "abs", "reciprocal", "sqrt", "reciprocal_sqrt"]
 BINARY = ["add", "sub", "mul", "div", "min", "max"]
 RELATIONS = ["lt", "le", "eq", "gt", "ge"]
 TESTS = ["is_zero", "is_negative", "sign"]
@@ -21,19 +26,24 @@ LOGIC = ["logical_and", "logical_or"]
 @st.composite
 def datapaths(draw):
     """Random graphs with a few inputs, some of them late, and several outputs, some of them early."""
-    latencies = draw(st.dictionaries(st.sampled_from(["add", "mul", "div", "cmp", "select"]), st.integers(0, 7)))
-    dp = Datapath(FMT, latencies=latencies, rounding=draw(st.sampled_from(Rounding)))
+    latencies = draw(st.dictionaries(st.sampled_from([
+        "add", "mul", "div", "cmp", "rec", "sqrt", "rsqrt", "dot", "select"]), st.integers(0, 7)))
+    dp = Datapath(FMT, latencies=latencies, rounding=draw(st.sampled_from(Rounding)),
+                  operators=draw(st.sampled_from([{}, {"div": TableDivider}])), window=draw(st.integers(7, 10)))
     floats = [dp.input(f"x{index}", delay=draw(st.integers(0, 9))) for index in range(draw(st.integers(1, 3)))]
     floats += [*dp.vector("v"), dp.const(draw(st.sampled_from([0.0, -0.0, 1.0, -0.3, 100.0, float("inf")])))]
     flags = [dp.flag("f", delay=draw(st.integers(0, 9)))]
     for _ in range(draw(st.integers(1, 12))):
         def pick(nodes):
             return draw(st.sampled_from(nodes))
-        kind = draw(st.sampled_from(["unary", "binary", "binary", "relation", "test", "logic", "not", "select"]))
+        kind = draw(st.sampled_from(["unary", "binary", "binary", "dot", "relation", "test", "logic", "not", "select"]))
         if kind == "unary":
             floats.append(getattr(dp, pick(UNARY))(pick(floats)))
         elif kind == "binary":
             floats.append(getattr(dp, pick(BINARY))(pick(floats), pick(floats)))
+        elif kind == "dot":
+            vectors = [Vector(*(pick(floats) for _ in "xyz")) for _ in range(2)]
+            floats.append(dp.dot(*vectors, *draw(st.sampled_from([(), (pick(floats),)]))))
         elif kind == "relation":
             flags.append(getattr(dp, pick(RELATIONS))(pick(floats), pick(floats)))
         elif kind == "test":
@@ -138,7 +148,50 @@ def test_cost():
     dp.output("r", dp.abs(dp.neg(dp.mul(dp.add(a, b), c))))
     dp.div(a, c)
     assert dp.cost() == {"add": 2, "mul": 1, "div": 0, "cmp": 1}
+    dp.output("s", dp.dot(Vector(a, b, c), Vector(c, a, b), dp.sqrt(a)))
+    assert dp.cost() == {"add": 2, "mul": 1, "div": 0, "cmp": 1, "sqrt": 1, "dot": 1}
 
+
+@pytest.fixture
+def measured(tmp_path, monkeypatch):
+    """A table of depths made up for the test."""
+    rows = [["Adder", "7.16", latency, lut, ff, 0, 0, mhz] for latency, lut, ff, mhz in (
+        (4, 300, 150, 90.0), (6, 310, 250, 130.0), (7, 300, 250, 140.0), (8, 320, 340, 180.0))]
+    rows.append(["Adder", "5.8", 9, 200, 200, 0, 0, 190.0])
+    columns = ["operator", "format", "latency", "lut", "ff", "dsp", "ebr", "fmax_worst_mhz"]
+    path = tmp_path / "measured.json"
+    path.write_text(json.dumps({"columns": columns, "rows": rows}))
+    monkeypatch.setattr(fpu_depth, "_TABLE", path)
+    fpu_depth._measured.cache_clear()
+    yield
+    fpu_depth._measured.cache_clear()
+
+
+def test_cheapest_depth_for_a_clock(measured):
+    fmt = FloatFormat(7, 16)
+    assert [cheapest_latency(Adder, fmt, clock_mhz=clock) for clock in (80, 100, 135, 175)] == [4, 7, 7, 8]
+    assert cheapest_latency(Subtractor, fmt, clock_mhz=100) == 7
+    with pytest.raises(ValueError, match=r"^No depth of Adder in 7\.16 reaches 200 MHz; the highest clock is 180 MHz$"):
+        cheapest_latency(Adder, fmt, clock_mhz=200)
+    # Formats of which not all depths have been measured go by the delays.
+    assert cheapest_latency(Adder, FloatFormat(5, 8), clock_mhz=185) == 9
+    fast, slow = (cheapest_latency(Adder, FloatFormat(6, 9), clock_mhz=clock) for clock in (170, 60))
+    assert slow < fast
+    dp = Datapath(fmt, clock_mhz=135, latencies={"mul": 2})
+    a, b = dp.input("a"), dp.input("b")
+    dp.output("r", dp.add(dp.mul(a, b), b))
+    assert dp.latency == 2 + 7
+
+
+def test_measured_table_is_of_the_operators():
+    """The table that is shipped names depths that exist, and some depth of each operator for the chip's clock."""
+    table = json.loads(fpu_depth._TABLE.read_text())
+    names = {row[0] for row in table["rows"]}
+    assert {"Adder", "Multiplier", "Divider", "Comparator"} <= names
+    dp = Datapath(FloatFormat(7, 16), clock_mhz=125)
+    a, b = dp.input("a"), dp.input("b")
+    dp.output("r", dp.select(dp.lt(a, b), dp.add(a, b), dp.mul(a, dp.div(a, b))))
+    assert dp.latency > 0
 
 def test_kernel_in_compiled_code():
     dp = ray_plane()
@@ -183,8 +236,10 @@ def test_misuse():
         dp.input("a b")
     with pytest.raises(ValueError, match="outputs"):
         dp.kernel()
-    with pytest.raises(ValueError, match="sqrt"):
-        Datapath(FMT, latencies={"sqrt": 3})
+    with pytest.raises(ValueError, match="not for cube"):
+        Datapath(FMT, latencies={"cube": 3})
+    with pytest.raises(ValueError, match="not for cube"):
+        Datapath(FMT, operators={"cube": Adder})
     dp.output("r", a)
     with pytest.raises(ValueError, match="not members"):
         dp.model(a=0.1, f=False)
