@@ -46,7 +46,7 @@ class Datapath(Graph):
         How all results are rounded, where there is a choice.
     operators : dict from str to type
         Other classes for some of the operations, such as ``{"div": TableDivider}``.
-    window : int or None
+    guard_width : int or None
         Of dot products, see :class:`~fpu.dot_product.DotProduct`.
     clock_mhz : float or None
         Clock that each operator alone is to reach on an ECP5 of grade 6: latencies that are not given are the cheapest
@@ -61,7 +61,7 @@ class Datapath(Graph):
         If a float is given where a flag is expected, or the other way round.
     """
 
-    def __init__(self, fmt, *, latencies=None, rounding=Rounding.NEAREST_EVEN, operators=None, window=None,
+    def __init__(self, fmt, *, latencies=None, rounding=Rounding.NEAREST_EVEN, operators=None, guard_width=None,
                  clock_mhz=None):
         latencies, operators = dict(latencies or {}), dict(operators or {})
         known = {*COUNTED_AS.values(), "select"}
@@ -72,7 +72,7 @@ class Datapath(Graph):
             raise ValueError(f"Operators may be given for {', '.join(sorted(OPERATORS))}, "
                              f"not for {', '.join(sorted(operators.keys() - OPERATORS.keys()))}")
         self.rounding = Rounding(rounding)
-        self.window = DotProduct.default_window(fmt) if window is None else window
+        self.guard_width = guard_width
         self.clock_mhz = clock_mhz
         self._operators = OPERATORS | operators
         super().__init__(fmt, latencies={"select": latencies.get("select", 0)})
@@ -97,7 +97,7 @@ class Datapath(Graph):
         if "rounding" in signature(cls).parameters:
             parameters["rounding"] = self.rounding
         if node.op == "dot":
-            parameters |= {"window": self.window, "has_addend": len(node.operands) == 7}
+            parameters |= {"guard_width": self.guard_width, "has_addend": len(node.operands) == 7}
         return cls(self.fmt, latency=self.latency_of_operator(node.op), **parameters)
 
     def emulation(self, op):

@@ -27,8 +27,10 @@ def _exponent(x):
 
 
 @emulated
-def _exact_sum(params, window, ax, ay, az, bx, by, bz, c):
+def _exact_sum(params, guard_width, ax, ay, az, bx, by, bz, c):
     """Sum of the terms cut to the window, as float64, which holds it; NaN where there are both infinities."""
+    frac_width = 52 - params[0]
+    window = frac_width + (frac_width if guard_width < 0 else guard_width)
     highest, infinite = _LOWEST, 0.0
     for a, b in ((ax, bx), (ay, by), (az, bz), (c, 1.0)):
         term = a * b
@@ -50,24 +52,24 @@ def _exact_sum(params, window, ax, ay, az, bx, by, bz, c):
 
 
 @emulated
-def dot_product(params, window, ax, ay, az, bx, by, bz, c):
+def dot_product(params, guard_width, ax, ay, az, bx, by, bz, c):
     """ax·bx + ay·by + az·bz + c as of :class:`DotProduct`, rounded to nearest even."""
-    return round_nearest(params, _exact_sum(params, window, ax, ay, az, bx, by, bz, c))
+    return round_nearest(params, _exact_sum(params, guard_width, ax, ay, az, bx, by, bz, c))
 
 
 @emulated
-def dot_product_truncate(params, window, ax, ay, az, bx, by, bz, c):
+def dot_product_truncate(params, guard_width, ax, ay, az, bx, by, bz, c):
     """ax·bx + ay·by + az·bz + c as of :class:`DotProduct`, rounded towards zero."""
-    return round_truncate(params, _exact_sum(params, window, ax, ay, az, bx, by, bz, c))
+    return round_truncate(params, _exact_sum(params, guard_width, ax, ay, az, bx, by, bz, c))
 
 
 class DotProduct(Operator):
     """r = a₀·b₀ + a₁·b₁ + a₂·b₂ + c, rounded once.
 
     The products are exact. All four terms are aligned to the one of the highest exponent (of a product: the sum of its
-    factors'), cut towards zero ``window`` bits below that exponent's place, and their sum is rounded. So with the
-    default window the error is up to half a unit in the last place of the result, and of each term that is not the
-    highest up to 2^-window of the highest, which counts only where the terms cancel.
+    factors'), cut towards zero ``frac_width + guard_width`` bits below that exponent's place, and their sum is rounded.
+    So the error is up to half a unit in the last place of the result, and for each term that is cut up to one in the
+    last place kept, which counts only where the terms cancel. By default no product of the highest exponent is cut.
 
     0·∞ is +0, as a term; infinities of both signs give +0; an exact zero is +0.
 
@@ -75,9 +77,8 @@ class DotProduct(Operator):
     ----------
     fmt, latency, rounding
         See :class:`~fpu.operator.Operator`.
-    window : int or None
-        Bits kept below the highest exponent, from ``frac_width + 2`` to ``2 * frac_width``, which is the default:
-        there a product of that exponent ends.
+    guard_width : int or None
+        Bits kept below the last place of a float of the highest exponent, 2 to ``frac_width``, which is the default.
     has_addend : bool
         Whether there is ``c``.
 
@@ -93,39 +94,35 @@ class DotProduct(Operator):
     Raises
     ------
     ValueError
-        If ``window`` is outside its limits or ``latency`` negative.
+        If ``guard_width`` is outside its limits or ``latency`` negative.
     """
 
-    #: Compiled emulation by rounding: ``f(fmt.params, window, *a, *b, c)``.
+    #: Compiled emulation by rounding: ``f(fmt.params, guard_width, *a, *b, c)``, with -1 for the default.
     emulation = MappingProxyType({Rounding.NEAREST_EVEN: dot_product, Rounding.TRUNCATE: dot_product_truncate})
 
-    def __init__(self, fmt, *, window=None, has_addend=True, latency=None, rounding=Rounding.NEAREST_EVEN):
-        self.window = self.default_window(fmt) if window is None else window
+    def __init__(self, fmt, *, guard_width=None, has_addend=True, latency=None, rounding=Rounding.NEAREST_EVEN):
+        self.guard_width = fmt.frac_width if guard_width is None else guard_width
         self.has_addend = has_addend
-        if not min(fmt.frac_width + 2, 2 * fmt.frac_width) <= self.window <= 2 * fmt.frac_width:
-            raise ValueError(f"Window of a dot product in {fmt} must be between {fmt.frac_width + 2} and "
-                             f"{2 * fmt.frac_width} bits, not {self.window!r}")
+        if not min(2, fmt.frac_width) <= self.guard_width <= fmt.frac_width:
+            raise ValueError(f"Guard bits of a dot product in {fmt} must be between 2 and {fmt.frac_width}, not "
+                             f"{self.guard_width!r}")
+        self._window = fmt.frac_width + self.guard_width
         vector = data.ArrayLayout(fmt, 3)
         super().__init__(fmt, {"a": In(vector), "b": In(vector), **({"c": In(fmt)} if has_addend else {}),
                                "r": Out(fmt)}, latency=latency, rounding=rounding)
 
-    @staticmethod
-    def default_window(fmt):
-        """Bits of ``window`` where none are given."""
-        return 2 * fmt.frac_width
-
     @classmethod
     def default_latency(cls, fmt, *, stage_delay=None):
         """Latency in cycles where none is given, for a component that need not be there."""
-        return depth_for(cls._delays_of(fmt, cls.default_window(fmt)).values(), stage_delay=stage_delay)
+        return depth_for(cls._delays_of(fmt, 2 * fmt.frac_width).values(), stage_delay=stage_delay)
 
     @property
     def _term_width(self):
         # A product is in [1, 4).
-        return self.window + 2
+        return self._window + 2
 
     def _delays(self):
-        return self._delays_of(self.fmt, self.window)
+        return self._delays_of(self.fmt, self._window)
 
     @classmethod
     def _delays_of(cls, fmt, window):
@@ -170,7 +167,7 @@ class DotProduct(Operator):
         common = {"inf": plus_inf ^ minus_inf, "invalid": plus_inf & minus_inf, "inf_sign": minus_inf}
         common |= {f"sign{index}": getattr(s, f"sign{index}") for index in live}
         # Cut to the window; zeros have no hidden bit.
-        below = 2 * fmt.frac_width - self.window
+        below = 2 * fmt.frac_width - self._window
         moved = {f"term{index}": Mux(getattr(s, f"zero{index}"), 0, significands[index][below:]) for index in live}
         moved |= {f"exp{index}": getattr(s, f"exp{index}") for index in live}
 
@@ -180,7 +177,7 @@ class DotProduct(Operator):
         carried = [*common, *moved]
         s = step("highest", highest=self._higher(m, "highest", *(getattr(s, f"pair{i}") for i in range(len(pairs)))),
                  **{name: getattr(s, name) for name in carried})
-        levels = range((self.window + 1).bit_length())
+        levels = range((self._window + 1).bit_length())
         distances = {}
         for index in live:
             distance = carry_chain(m, f"distance_{index}", (ChainBit.CARRY, Const(1, 1), 0, 0), (

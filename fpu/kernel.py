@@ -25,7 +25,7 @@ _EXPRESSIONS = {
 _RELATIONS = {"lt": "<", "eq": "==", "gt": ">"}
 
 
-def _expression(node, names, window):
+def _expression(node, names, guard_width):
     operands = [names[operand] for operand in node.operands if operand.op != "compare"]
     if node.op == "const":
         return repr(node.payload)
@@ -36,7 +36,7 @@ def _expression(node, names, window):
     if node.op in _EXPRESSIONS:
         return _EXPRESSIONS[node.op].format(*operands)
     if node.op == "dot":
-        operands = [str(window), *operands, *(["0.0"] if len(operands) == 6 else [])]
+        operands = [str(-1 if guard_width is None else guard_width), *operands, *(["0.0"] if len(operands) == 6 else [])]
     return f"{node.op}(params, {', '.join(operands)})"
 
 
@@ -58,7 +58,7 @@ def kernel_source(datapath, *, cache):
     for index, node in enumerate(nodes):
         if node.op not in ("input", "compare"):
             names[node] = f"{node.op}_{index}"
-            lines.append(f"    {names[node]} = {_expression(node, names, datapath.window)}")
+            lines.append(f"    {names[node]} = {_expression(node, names, datapath.guard_width)}")
     outputs = [f"out_{name}" for name in datapath.output_names]
     results = "".join(f"{names[node]}, " for node in datapath.outputs.values())
     elements = ["params", *(f"{name}[index]" for name in inputs)]

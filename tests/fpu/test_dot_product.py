@@ -20,7 +20,7 @@ def exponent(x):
     return math.frexp(x)[1] - 1
 
 
-def expected(fmt, window, factors, addend, *, truncate):
+def expected(fmt, guard_width, factors, addend, *, truncate):
     """Bit pattern by the words of DotProduct's docstring."""
     parameters = fmt.exp_width, fmt.frac_width
     terms, infinite = [], set()
@@ -35,7 +35,7 @@ def expected(fmt, window, factors, addend, *, truncate):
         return 0 if len(infinite) == 2 else reference.pack(int(-1.0 in infinite), math.inf, *parameters)
     if not terms:
         return 0
-    unit = Fraction(2) ** (max(exp for exp, _ in terms) - window)
+    unit = Fraction(2) ** (max(exp for exp, _ in terms) - fmt.frac_width - guard_width)
     total = sum(int(term / unit) for _, term in terms) * unit
     return reference.pack(int(total < 0), abs(total), *parameters, truncate=truncate) if total else 0
 
@@ -81,8 +81,8 @@ def simulated(dut, rows):
     *((TINY, {"latency": latency}, 300) for latency in range(MAX_LATENCY + 1)),
     *((TINY, {"rounding": Rounding.TRUNCATE, "latency": latency}, 300) for latency in (0, 5, None)),
     (TINY, {"has_addend": False}, 300), (FloatFormat(2, 1), {}, 300),
-    (DEFAULT, {}, 300), (DEFAULT, {"rounding": Rounding.TRUNCATE}, 150), (DEFAULT, {"window": 18}, 300),
-    (DEFAULT, {"window": 22, "has_addend": False, "latency": 9}, 150),
+    (DEFAULT, {}, 300), (DEFAULT, {"rounding": Rounding.TRUNCATE}, 150), (DEFAULT, {"guard_width": 2}, 300),
+    (DEFAULT, {"guard_width": 6, "has_addend": False, "latency": 9}, 150),
     (FloatFormat(8, 23), {}, 150), (FloatFormat(5, 10), {"latency": 1}, 150),
 ], ids=str)
 def test_sum(fmt, parameters, count):
@@ -90,23 +90,24 @@ def test_sum(fmt, parameters, count):
     rows = samples(fmt, count, seed=1)
     if not dut.has_addend:
         rows[:, 6] = 0.0
-    want = [expected(fmt, dut.window, [(row[i], row[3 + i]) for i in range(3)], row[6],
+    want = [expected(fmt, dut.guard_width, [(row[i], row[3 + i]) for i in range(3)], row[6],
                      truncate=dut.rounding is Rounding.TRUNCATE) for row in rows.tolist()]
     emulate = dut.emulation[dut.rounding]
-    assert fmt.encode(np.array([emulate(fmt.params, dut.window, *row) for row in rows.tolist()])).tolist() == want
+    assert fmt.encode(np.array([emulate(fmt.params, dut.guard_width, *row) for row in rows.tolist()])).tolist() == want
     assert simulated(dut, rows) == want
 
 
-@pytest.mark.parametrize("window", [18, 22, 32])
-def test_error(window):
-    """Half a unit of the result, and 2^-window of the highest exponent's place for each term that is cut."""
+@pytest.mark.parametrize("guard_width", [2, 6, 16, -1])
+def test_error(guard_width):
+    """Half a unit of the result, and one in the last place kept for each term that is cut."""
     rows = samples(DEFAULT, 20_000, seed=2)
     emulate = DotProduct.emulation[Rounding.NEAREST_EVEN]
-    worst, num_cut = 0.0, 3 if window == 2 * DEFAULT.frac_width else 4
+    worst, num_cut = 0.0, 3 if guard_width in (16, -1) else 4
+    window = 32 if guard_width < 0 else 16 + guard_width
     for row in rows.tolist():
         terms = [Fraction(row[i]) * Fraction(row[3 + i]) for i in range(3) if math.isfinite(row[i] * row[3 + i])]
         exact = sum(terms) + (Fraction(row[6]) if math.isfinite(row[6]) else 0)
-        result = emulate(DEFAULT.params, window, *row)
+        result = emulate(DEFAULT.params, guard_width, *row)
         if not all(map(math.isfinite, row)) or not math.isfinite(result) or abs(result) < 4 * DEFAULT.min_normal:
             continue
         highest = max(exponent(row[i]) + exponent(row[3 + i]) for i in range(3) if row[i] and row[3 + i])
@@ -122,8 +123,8 @@ def test_every_latency_is_tested():
     assert len(DotProduct(TINY, latency=0)._delays()) < MAX_LATENCY
 
 
-@pytest.mark.parametrize("window", [17, 33])
-def test_window_limits(window):
-    with pytest.raises(ValueError, match=rf"^Window of a dot product in 7\.16 must be between 18 and 32 bits, not "
-                                         rf"{window}$"):
-        DotProduct(DEFAULT, window=window)
+@pytest.mark.parametrize("guard_width", [1, 17])
+def test_guard_limits(guard_width):
+    with pytest.raises(ValueError, match=rf"^Guard bits of a dot product in 7\.16 must be between 2 and 16, not "
+                                         rf"{guard_width}$"):
+        DotProduct(DEFAULT, guard_width=guard_width)
