@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light fpu-report clean
+.PHONY: help setup render test lint first-light fpu-report arithmetic clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -12,6 +12,7 @@ help:
 	@echo "make lint         ruff"
 	@echo "make first-light  the figures of docs/first-light.md, from the scenes in SCENES=$(SCENES)"
 	@echo "make fpu-report   the figures of docs/fpu.md: every operator placed and routed; PEER=FILE puts others' beside ours"
+	@echo "make arithmetic   what fused sums, tables and truncation do to pictures and datapaths, for docs/fpu.md"
 
 setup: $(VENV)/.ready
 
@@ -36,6 +37,9 @@ first-light: setup
 
 fpu-report: setup
 	$(BIN)/dynrt fpu-report $(if $(PEER),--peer $(PEER))
+
+arithmetic: setup
+	$(BIN)/dynrt arithmetic --scenes $(SCENES)
 
 clean:
 	rm -rf build .pytest_cache .ruff_cache

@@ -9,6 +9,7 @@ from .delay import Delay
 from .divider import Divider
 from .dot_product import DotProduct
 from .format import FloatFormat
+from .graph import Vector
 from .multiplier import Multiplier
 from .reciprocal import Reciprocal, TableDivider
 from .reciprocal_square_root import ReciprocalSquareRoot
@@ -18,5 +19,5 @@ from .square_root import SquareRoot
 __all__ = [
     "Adder", "Comparator", "Datapath", "Delay", "Divider", "DotProduct", "FloatFormat", "FloatToInt", "IntToFloat",
     "Maximum", "Minimum", "Multiplier", "Reciprocal", "ReciprocalSquareRoot", "Rounding", "SquareRoot",
-    "Subtractor", "TableDivider",
+    "Subtractor", "TableDivider", "Vector",
 ]

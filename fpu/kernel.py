@@ -36,7 +36,8 @@ def _expression(node, names, guard_width):
     if node.op in _EXPRESSIONS:
         return _EXPRESSIONS[node.op].format(*operands)
     if node.op == "dot":
-        operands = [str(-1 if guard_width is None else guard_width), *operands, *(["0.0"] if len(operands) == 6 else [])]
+        addend = ["0.0"] if len(operands) == 6 else []
+        operands = [str(-1 if guard_width is None else guard_width), *operands, *addend]
     return f"{node.op}(params, {', '.join(operands)})"
 
 

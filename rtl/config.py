@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 from fpu import FloatFormat
 
+from .arithmetic import ARITHMETICS
+
 
 @dataclass(frozen=True)
 class ChipConfig:
@@ -35,6 +37,8 @@ class ChipConfig:
         Bits of a node, list or matrix number.
     coord_width : int
         Bits of a pixel coordinate.
+    arithmetic : int
+        Which of :data:`~rtl.arithmetic.ARITHMETICS` it computes by.
 
     Raises
     ------
@@ -58,6 +62,7 @@ class ChipConfig:
     num_fetches: int = 4
     index_width: int = 24
     coord_width: int = 12
+    arithmetic: int = 0
 
     def __post_init__(self):
         ranges = {
@@ -66,6 +71,7 @@ class ChipConfig:
             "node_lines": (2, 1 << 16), "node_line_items": (1, 8), "list_lines": (2, 1 << 16),
             "list_line_items": (1, 16), "matrix_lines": (2, 1 << 16), "num_fetches": (1, 16),
             "index_width": (8, 24), "coord_width": (4, 14),
+            "arithmetic": (0, len(ARITHMETICS) - 1),
         }
         for name, (low, high) in ranges.items():
             value = getattr(self, name)

@@ -5,6 +5,7 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import exact_log2
 
+from .arithmetic import ARITHMETICS
 from .cache import WORD_WIDTH, Cache
 from .config import ChipConfig
 from .counters import Counters
@@ -118,6 +119,7 @@ class DynRTC(wiring.Component):
         token = dict(num_threads=config.num_threads, stack_depth=config.stack_depth)
         widths = dict(**token, index_width=config.index_width)
         floats = dict(fmt=fmt, latencies=config.latencies)
+        computing = dict(**floats, arithmetic=ARITHMETICS[config.arithmetic])
         cache = dict(num_waiting=config.num_threads, num_fetches=config.num_fetches, index_width=config.index_width)
         caches = {
             "nodes": Cache(item_width=NODE_BITS, payload_shape=self._token, num_lines=config.node_lines,
@@ -130,10 +132,10 @@ class DynRTC(wiring.Component):
         rays = RayGeneration(**token, coord_width=config.coord_width)
         store = RayStore(fmt=fmt, num_threads=config.num_threads)
         stack = TraversalStack(**floats, **widths)
-        traversal = Traversal(**floats, **widths)
+        traversal = Traversal(**computing, **widths)
         mailboxed_list = MailboxedList(mailbox_entries=config.mailbox_entries, **widths)
-        transformation = Transformation(**floats, coord_width=config.coord_width, **widths)
-        intersection = Intersection(**floats, **widths)
+        transformation = Transformation(**computing, coord_width=config.coord_width, **widths)
+        intersection = Intersection(**computing, **widths)
         write_out = WriteOut(fmt=fmt, coord_width=config.coord_width, **widths)
         for name, cache in caches.items():
             m.submodules[f"{name}_cache"] = cache

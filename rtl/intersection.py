@@ -6,19 +6,20 @@ from amaranth.lib.wiring import In, Out
 
 from fpu import Datapath, Delay
 
+from .arithmetic import ARITHMETICS
 from .layout import PACKET_RAYS, thread_width, token_layout, vector_layout, with_token
 
 __all__ = ["Intersection", "hit_layout", "unit_triangle"]
 
 
-def unit_triangle(fmt, *, latencies=None):
+def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0]):
     """t = −O′z / D′z, u = O′x + t·D′x, v = O′y + t·D′y; ``hit`` if 0 < t < ∞, u ≥ 0, v ≥ 0 and u + v ≤ 1.
 
     ``nearer`` if t < t_hit, which comes in just in time, as late as t is known (paper §2.1.2).
 
     Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator.
     """
-    dp = Datapath(fmt, latencies=latencies)
+    dp = Datapath(fmt, latencies=latencies, **arithmetic.parameters)
     origin, direction = dp.vector("origin"), dp.vector("direction")
     t = dp.neg(dp.div(origin.z, direction.z))
     t_hit = dp.input("t_hit", delay=dp.arrival(t))
@@ -56,6 +57,8 @@ class Intersection(wiring.Component):
         See :class:`~rtl.config.ChipConfig`.
     latencies : dict
         Of the operators, see :class:`~fpu.Datapath`.
+    arithmetic : :class:`~rtl.arithmetic.Arithmetic`
+        How it computes.
 
     Members
     -------
@@ -68,9 +71,11 @@ class Intersection(wiring.Component):
     busy : a ray is taken in
     """
 
-    def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None):
+    def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None,
+                 arithmetic=ARITHMETICS[0]):
         self._fmt = fmt
         self._latencies = latencies
+        self._arithmetic = arithmetic
         self._num_threads = num_threads
         self._index_width = index_width
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
@@ -91,7 +96,7 @@ class Intersection(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         num_slots = 1 << thread_width(self._num_threads)
-        graph = unit_triangle(self._fmt, latencies=self._latencies)
+        graph = unit_triangle(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic)
         m.submodules.test = test = graph.component()
 
         vector = self.vector.payload

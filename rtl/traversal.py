@@ -6,6 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from fpu import Datapath, Delay
 
+from .arithmetic import ARITHMETICS
 from .layout import (
     PACKET_RAYS,
     Axis,
@@ -21,7 +22,7 @@ from .ray_store import RayStore, ray_store_ports
 __all__ = ["Traversal", "kd_step"]
 
 
-def kd_step(fmt, *, latencies=None):
+def kd_step(fmt, *, latencies=None, arithmetic=ARITHMETICS[0]):
     """One ray's kd-step: t = (split − origin) / direction; which children it visits, and on which interval.
 
     A ray with direction > 0 visits the lower child on [t_near, min(t, t_far)] if t_near ≤ t, and the upper
@@ -31,10 +32,10 @@ def kd_step(fmt, *, latencies=None):
 
     Datapath: 1 subtracter, 1 divider, 2 comparators.
     """
-    dp = Datapath(fmt, latencies=latencies)
+    dp = Datapath(fmt, latencies=latencies, **arithmetic.parameters)
     split, origin, direction = dp.input("split"), dp.input("origin"), dp.input("direction")
     offset = dp.sub(split, origin)
-    t = dp.div(offset, direction)
+    t = dp.mul(offset, dp.reciprocal(direction)) if arithmetic.by_reciprocal else dp.div(offset, direction)
     t_near, t_far = (dp.input(name, delay=dp.arrival(t)) for name in ("t_near", "t_far"))
     before = dp.le(t_near, t)
     beyond = dp.le(t, t_far)
@@ -73,6 +74,8 @@ class Traversal(wiring.Component):
         See :class:`~rtl.config.ChipConfig`.
     latencies : dict
         Of the operators, see :class:`~fpu.Datapath`.
+    arithmetic : :class:`~rtl.arithmetic.Arithmetic`
+        How it computes.
 
     Members
     -------
@@ -86,9 +89,11 @@ class Traversal(wiring.Component):
     busy : a step begins
     """
 
-    def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None):
+    def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None,
+                 arithmetic=ARITHMETICS[0]):
         self._fmt = fmt
         self._latencies = latencies
+        self._arithmetic = arithmetic
         self._num_threads = num_threads
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         self._node = node_layout(fmt=fmt, index_width=index_width)
@@ -111,8 +116,8 @@ class Traversal(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        steps = [kd_step(self._fmt, latencies=self._latencies).component() for _ in range(PACKET_RAYS)]
-        graph = kd_step(self._fmt, latencies=self._latencies)
+        graph = kd_step(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic)
+        steps = [graph.component() for _ in range(PACKET_RAYS)]
         read_latency = RayStore.read_latency
         # The interval's address goes out so much before the interval is wanted, as the rays' did before them.
         fetch_at = graph.inputs["t_near"].start

@@ -2,6 +2,7 @@
 
 import click
 
+from .arithmetic import arithmetic
 from .first_light import first_light
 from .fpu_report import fpu_report
 from .inspect import image
@@ -16,6 +17,7 @@ def main():
     """DynRT: a real-time ray tracer in hardware, simulated."""
 
 
+main.add_command(arithmetic)
 main.add_command(first_light)
 main.add_command(fpu_report)
 main.add_command(render)

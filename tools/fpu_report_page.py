@@ -4,7 +4,7 @@ import re
 
 from .errors import BadInput
 
-__all__ = ["check_markers", "filled"]
+__all__ = ["between_markers", "check_markers", "filled", "markdown_table"]
 
 _CLOCK_MHZ = 175
 #: Most that an operator at 7.16 and its default depth is to take, in one of these ways; what is not named, none of it.
@@ -18,7 +18,8 @@ _TARGETS = {
 _RESOURCES = {"lut": "LUT", "ff": "FF", "dsp": "DSP", "ebr": "EBR"}
 
 
-def _table(head, rows):
+def markdown_table(head, rows):
+    """Lines of a table, or that there is nothing to show."""
     if not rows:
         return "Not measured.\n"
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
@@ -58,7 +59,7 @@ def _default(results):
         fast = _nearest(results, format="7.16", grade=8, default=True, operator=row["operator"])
         rows.append([row["operator"], row["latency"], *_resources(row), _mhz(row), _mhz(fast[0]) if fast else "–",
                      _ulp(row)])
-    return _table(["operator", "latency", *_RESOURCES.values(), "MHz, grade 6: median / worst",
+    return markdown_table(["operator", "latency", *_RESOURCES.values(), "MHz, grade 6: median / worst",
                    "MHz, grade 8: median / worst", "error in ulp: max / mean"], rows)
 
 
@@ -76,7 +77,7 @@ def _targets(results):
             met = any(all(took[name] <= way.get(name, 0) for name in took) for way in ways)
             rows.append([row["operator"], " or ".join(f"≤ {_cost(way)}" for way in ways), _cost(took),
                          "yes" if met else "no"])
-    return _table(["operator", "target", "measured", "met"], rows)
+    return markdown_table(["operator", "target", "measured", "met"], rows)
 
 
 def _depth(results):
@@ -86,7 +87,7 @@ def _depth(results):
         rows.append([row["operator"], latency, *_resources(row), _mhz(row)])
     operators = list(dict.fromkeys(row["operator"] for row in results["operators"]))
     rows.sort(key=lambda row: operators.index(row[0]))
-    return _table(["operator", "latency", *_RESOURCES.values(), "MHz: median / worst"], rows)
+    return markdown_table(["operator", "latency", *_RESOURCES.values(), "MHz: median / worst"], rows)
 
 
 def _format_order(name):
@@ -106,7 +107,7 @@ def _formats(results):
         for operator in dict.fromkeys(row["operator"] for row in found):
             own = {row["format"]: row for row in _select(found, operator=operator)}
             rows.append([operator, *(cell(own[fmt]) if fmt in own else "–" for fmt in formats)])
-        tables.append(f"{title}:\n\n{_table(['operator', *formats], rows)}")
+        tables.append(f"{title}:\n\n{markdown_table(['operator', *formats], rows)}")
     return "\n".join(tables)
 
 
@@ -118,7 +119,7 @@ def _truncation(results):
             rows.append([row["operator"], row["latency"],
                          *(f"{nearest[name]} → {row[name]}" for name in ("lut", "ff")),
                          f"{_mhz(nearest)} → {_mhz(row)}", f"{_ulp(nearest)} → {_ulp(row)}"])
-    return _table(["operator", "latency", "LUT", "FF", "MHz: median / worst", "error in ulp: max / mean"], rows)
+    return markdown_table(["operator", "latency", "LUT", "FF", "MHz: median / worst", "error in ulp: max / mean"], rows)
 
 
 def _area_time(row):
@@ -135,7 +136,7 @@ def _peers(results):
             if (row["cycles_per_result"] > 1) == is_iterative:
                 rows += _peer_and_ours(results, row, notes)
         if rows or not is_iterative:
-            table = _table(["operator", "format", "latency", *_RESOURCES.values(), "MHz: median / worst",
+            table = markdown_table(["operator", "format", "latency", *_RESOURCES.values(), "MHz: median / worst",
                             "LUT × ns a result", "theirs ÷ ours"], rows)
             parts.append(f"{title}\n\n{table}")
     parts += [f"[{number}] {note}.\n" for note, number in notes.items()]
@@ -168,6 +169,24 @@ def _between(name):
     return re.compile(rf"(?<=<!-- begin: {name} -->\n).*?(?=^<!-- end: {name} -->$)", re.DOTALL | re.MULTILINE)
 
 
+def between_markers(page, name):
+    """Pattern of what stands at the place of the table ``name`` in ``page``.
+
+    Raises
+    ------
+    BadInput
+        If there is no page, or no such place.
+    """
+    try:
+        text = page.read_text()
+    except OSError as error:
+        raise BadInput(f"{page}: cannot be read: {error.strerror}") from error
+    if len(_between(name).findall(text)) != 1:
+        raise BadInput(f"{page}: must have the lines '<!-- begin: {name} -->' and '<!-- end: {name} -->' once, for "
+                       "the table between them")
+    return _between(name)
+
+
 def check_markers(page):
     """Sees that every table has its place in ``page``.
 
@@ -176,14 +195,8 @@ def check_markers(page):
     BadInput
         If there is no page, or a place is missing.
     """
-    try:
-        text = page.read_text()
-    except OSError as error:
-        raise BadInput(f"{page}: cannot be read: {error.strerror}") from error
     for name in _PARTS:
-        if len(_between(name).findall(text)) != 1:
-            raise BadInput(f"{page}: must have the lines '<!-- begin: {name} -->' and '<!-- end: {name} -->' once, for "
-                           "the table between them")
+        between_markers(page, name)
 
 
 def filled(page, results):

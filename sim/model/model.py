@@ -26,8 +26,8 @@ def camera_rows(image, camera, width):
 
 
 @compiled(parallel=True)
-def _render(params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, camera, packets, x, y, width,
-            height, hits, owners, counts, whole):
+def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, camera, packets,
+            x, y, width, height, hits, owners, counts, whole):
     for number in numba.prange(len(packets)):
         px, py = packets[number]
         screen = np.empty((4, 2))
@@ -39,8 +39,8 @@ def _render(params, root, nodes, splits, lists, matrices, mailbox_entries, stack
             if column < width and row < height:
                 mask |= 1 << ray
                 screen[ray, 0], screen[ray, 1] = x[column], y[row]
-        whole[number] = trace_packet(params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth,
-                                     camera, screen, mask, packet_hits, packet_owners, counts[number])
+        whole[number] = trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries,
+                                     stack_depth, camera, screen, mask, packet_hits, packet_owners, counts[number])
         for ray in range(4):
             if mask >> ray & 1:
                 hits[py + (ray >> 1), px + (ray & 1)] = packet_hits[ray]
@@ -59,7 +59,7 @@ def render_model(image: SceneImage, camera, width, height, *, config, background
     width, height : int
         Size of the picture in pixels.
     config : ChipConfig
-        The chip, of which mailbox and stack matter.
+        The chip, of which mailbox, stack and arithmetic matter.
     background : tuple of int
         Colour of rays that hit nothing.
 
@@ -82,7 +82,7 @@ def render_model(image: SceneImage, camera, width, height, *, config, background
     owners = np.empty((height, width, 2), np.int64)
     counts = np.zeros((len(packets), len(COUNTS)), np.int64)
     whole = np.zeros(len(packets), np.bool_)
-    _render(fmt.params, image.root, image.nodes[:, 0].astype(np.int64), image.split_values(),
+    _render(config.arithmetic, fmt.params, image.root, image.nodes[:, 0].astype(np.int64), image.split_values(),
             image.lists.astype(np.int64), image.matrix_values(), config.mailbox_entries, config.stack_depth,
             camera_rows(image, camera, width), packets, x, y, width, height, hits, owners, counts, whole)
     if not whole.all():

@@ -2,21 +2,12 @@
 
 import numpy as np
 
-from fpu import FloatFormat
-from rtl.intersection import unit_triangle
-from rtl.transformation import affine_map
-from rtl.traversal import kd_step
-
 from ..scene.image import INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, UPPER_EMPTY
 from .compiled import compiled
+from .datapaths import affine_map, kd_step, unit_triangle
 
 __all__ = ["COUNTS", "trace_packet"]
 
-# The kernels are the same for every format, which they take as an argument.
-_ANY = FloatFormat(7, 16)
-_kd_step = kd_step(_ANY).kernel()
-_affine_map = affine_map(_ANY).kernel()
-_unit_triangle = unit_triangle(_ANY).kernel()
 
 _VISIT, _LIST, _POP = range(3)
 
@@ -26,19 +17,21 @@ _STEPS, _LEAVES, _ENTRIES, _VECTORS, _TESTS, _INSTANCES, _POPS, _DEPTH = range(8
 
 
 @compiled()
-def _transform(params, matrix, vector, is_point):
-    return _affine_map(params, is_point, vector[0], vector[1], vector[2], matrix[3, 0], matrix[3, 1], matrix[3, 2],
-                       matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[1, 0], matrix[1, 1], matrix[1, 2],
-                       matrix[2, 0], matrix[2, 1], matrix[2, 2])
+def _transform(arithmetic, params, matrix, vector, is_point):
+    return affine_map(arithmetic, params, is_point, vector[0], vector[1], vector[2],
+                      matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[0, 0], matrix[0, 1], matrix[0, 2],
+                      matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[2, 0], matrix[2, 1], matrix[2, 2])
 
 
 @compiled()
-def trace_packet(params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, camera, screen, mask,
-                 hits, owners, counts):
+def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, camera,
+                 screen, mask, hits, owners, counts):
     """Traces four rays; see :func:`~sim.model.model.render_model` for what the arrays hold.
 
     Parameters
     ----------
+    arithmetic : int
+        Index into :data:`~rtl.arithmetic.ARITHMETICS`.
     params : tuple
         ``fmt.params``.
     root, nodes, splits, lists, matrices
@@ -85,7 +78,7 @@ def trace_packet(params, root, nodes, splits, lists, matrices, mailbox_entries, 
             counts[_VECTORS] += 1
             vector[0], vector[1], vector[2] = screen[ray, 0], screen[ray, 1], 1.0
             # The camera's origin is not mapped, so the fourth row of its matrix does not matter.
-            direction[0, ray] = _transform(params, camera, vector, False)
+            direction[0, ray] = _transform(arithmetic, params, camera, vector, False)
             interval[0, ray, 0], interval[0, ray, 1] = 0.0, np.inf
 
     level, node, instance, action = 0, root, -1, _VISIT
@@ -106,9 +99,9 @@ def trace_packet(params, root, nodes, splits, lists, matrices, mailbox_entries, 
             for ray in range(4):
                 if not mask >> ray & 1:
                     continue
-                lower, upper, lower_near, lower_far, upper_near, upper_far, backward = _kd_step(
-                    params, splits[node], origin[level, axis], direction[level, ray, axis], interval[level, ray, 0],
-                    interval[level, ray, 1])
+                lower, upper, lower_near, lower_far, upper_near, upper_far, backward = kd_step(
+                    arithmetic, params, splits[node], origin[level, axis], direction[level, ray, axis],
+                    interval[level, ray, 0], interval[level, ray, 1])
                 if upper_first < 0:
                     upper_first = 1 if backward else 0
                 if lower and not word & LOWER_EMPTY:
@@ -181,23 +174,23 @@ def trace_packet(params, root, nodes, splits, lists, matrices, mailbox_entries, 
                 mask = wanted
                 letter_rays[1] = 0
                 next_letter[1] = 0
-                origin[1] = _transform(params, matrix, origin[0], True)
+                origin[1] = _transform(arithmetic, params, matrix, origin[0], True)
                 for ray in range(4):
                     if mask >> ray & 1:
                         counts[_VECTORS] += 1
-                        direction[1, ray] = _transform(params, matrix, direction[0, ray], False)
+                        direction[1, ray] = _transform(arithmetic, params, matrix, direction[0, ray], False)
                         interval[1, ray, 0], interval[1, ray, 1] = 0.0, np.inf
                 level, sp[1], instance, node, action = 1, 0, index, index, _VISIT
                 continue
             if wanted:
                 counts[_VECTORS] += 1
-                ox, oy, oz = _transform(params, matrix, origin[level], True)
+                ox, oy, oz = _transform(arithmetic, params, matrix, origin[level], True)
                 for ray in range(4):
                     if wanted >> ray & 1:
                         counts[_VECTORS] += 1
                         counts[_TESTS] += 1
-                        dx, dy, dz = _transform(params, matrix, direction[level, ray], False)
-                        t, u, v, hit, nearer = _unit_triangle(params, ox, oy, oz, dx, dy, dz, hits[ray, 0])
+                        dx, dy, dz = _transform(arithmetic, params, matrix, direction[level, ray], False)
+                        t, u, v, hit, nearer = unit_triangle(arithmetic, params, ox, oy, oz, dx, dy, dz, hits[ray, 0])
                         if hit and (nearer or owners[ray, 0] < 0):
                             hits[ray, 0], hits[ray, 1], hits[ray, 2], hits[ray, 3] = t, u, v, dz
                             owners[ray, 0] = index

@@ -29,7 +29,8 @@ def datapaths(draw):
     latencies = draw(st.dictionaries(st.sampled_from([
         "add", "mul", "div", "cmp", "rec", "sqrt", "rsqrt", "dot", "select"]), st.integers(0, 7)))
     dp = Datapath(FMT, latencies=latencies, rounding=draw(st.sampled_from(Rounding)),
-                  operators=draw(st.sampled_from([{}, {"div": TableDivider}])), guard_width=draw(st.sampled_from([None, 2, 3, 5])))
+                  operators=draw(st.sampled_from([{}, {"div": TableDivider}])),
+                  guard_width=draw(st.sampled_from([None, 2, 3, 5])))
     floats = [dp.input(f"x{index}", delay=draw(st.integers(0, 9))) for index in range(draw(st.integers(1, 3)))]
     floats += [*dp.vector("v"), dp.const(draw(st.sampled_from([0.0, -0.0, 1.0, -0.3, 100.0, float("inf")])))]
     flags = [dp.flag("f", delay=draw(st.integers(0, 9)))]

@@ -1,0 +1,124 @@
+"""``dynrt arithmetic``: what fused dot products, reciprocals, tables and truncation do to a chip and its pictures."""
+
+import json
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from boards import ecp5
+from boards.toolchain import versions
+from fpu import FloatFormat
+from rtl.arithmetic import ARITHMETICS
+from rtl.config import ChipConfig
+from rtl.intersection import unit_triangle
+from rtl.transformation import affine_map
+from rtl.traversal import kd_step
+from sim.golden import psnr, render_golden
+from sim.model import render_model
+from sim.scene import Camera, load_scene
+from sim.scene.compile import CompiledScene
+
+from .errors import clear_errors, written_whole
+from .first_light import SCENES
+from .fpu_report_page import between_markers, markdown_table
+
+__all__ = ["arithmetic"]
+
+SIZE = 512, 384
+GRADE = 6
+FORMAT = FloatFormat(7, 16)
+DATAPATHS = {"transformation": affine_map, "kd-step": kd_step, "intersection": unit_triangle}
+
+
+def _pictures(scenes, console):
+    """Rows of scene and arithmetic: how far the model's picture is from golden, and what it takes to draw."""
+    cameras = json.loads((scenes / "cameras.json").read_text())
+    rows, pixels = [], SIZE[0] * SIZE[1]
+    for name, file, view in SCENES:
+        scene = load_scene("room" if file is None else scenes / file)
+        numbers = cameras[view][0] if view else None
+        camera = (Camera(numbers["eye"], numbers["at"], numbers["up"], numbers["hfov_deg"]) if view else
+                  scene.default_camera())
+        golden = render_golden(scene, camera, *SIZE)
+        image = CompiledScene(scene, fmt=FORMAT).image(scene)
+        for number, arithmetic in enumerate(ARITHMETICS):
+            frame = render_model(image, camera, *SIZE, config=replace(ChipConfig(), fmt=FORMAT, arithmetic=number))
+            counts = frame.report["counts"]
+            rows.append({"scene": name, "arithmetic": arithmetic.name,
+                         "wrong_pixels": int(frame.differs_in_surface(golden).sum()),
+                         "psnr_db": round(psnr(frame.color, golden.color), 2),
+                         **{f"{count}_per_ray": round(counts[count] / pixels, 3)
+                            for count in ("steps", "triangle_tests")}})
+        console.print(f"{name}: {len(ARITHMETICS)} arithmetics", soft_wrap=True)
+    return rows
+
+
+def _areas(seeds, jobs, console):
+    """Rows of datapath and arithmetic: what it takes alone, at the operators' default depths."""
+    designs = {}
+    for name, datapath in DATAPATHS.items():
+        for arithmetic in ARITHMETICS:
+            component = datapath(FORMAT, arithmetic=arithmetic).component()
+            designs[name, arithmetic.name] = component.latency, ecp5.design_of(component,
+                                                                              name=f"{name}, {arithmetic.name}")
+
+    def place(design):
+        placements = [ecp5.place(design, grade=GRADE, seed=seed) for seed in range(1, seeds + 1)]
+        console.print(f"{design.name}: placed", soft_wrap=True)
+        first, slowest = placements[0], min(placement.fmax_mhz for placement in placements)
+        return {"lut": first.lut, "ff": first.ff, "dsp": first.dsp, "ebr": first.ebr,
+                "fmax_worst_mhz": round(slowest, 1)}
+
+    # Where an arithmetic makes no difference to a datapath, its design is the same.
+    distinct = {design.folder: design for _, design in designs.values()}
+    with ThreadPoolExecutor(jobs) as pool:
+        figures = dict(zip(distinct, pool.map(place, distinct.values()), strict=True))
+    return [{"datapath": name, "arithmetic": way, "latency": latency, **figures[design.folder]}
+            for (name, way), (latency, design) in designs.items()]
+
+
+def _page(results):
+    names = [arithmetic.name for arithmetic in ARITHMETICS]
+    scenes = list(dict.fromkeys(row["scene"] for row in results["pictures"]))
+    pictures = {(row["scene"], row["arithmetic"]): row for row in results["pictures"]}
+    tables = [markdown_table(
+        ["scene: wrong pixels, PSNR", *names],
+        [[scene, *(f"{pictures[scene, name]['wrong_pixels']:,}, {pictures[scene, name]['psnr_db']:.1f} dB"
+                   for name in names)] for scene in scenes])]
+    rows = {}
+    for row in results["datapaths"]:
+        cells = [row["latency"], row["lut"], row["ff"], row["dsp"], row["ebr"], f"{row['fmax_worst_mhz']:.0f}"]
+        rows.setdefault((row["datapath"], *cells), []).append(row["arithmetic"])
+    rows = [[datapath, ", ".join(ways), *cells] for (datapath, *cells), ways in rows.items()]
+    tables.append(markdown_table(
+        ["datapath", "arithmetic", "latency", "LUT", "FF", "DSP", "EBR", "MHz, worst"], rows))
+    return "\n".join(tables)
+
+
+@click.command()
+@click.option("--scenes", type=click.Path(exists=True, file_okay=False, path_type=Path), required=True,
+              help="Folder with the scenes and cameras.json")
+@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
+              show_default=True, help="Where fpu.md is, and results/arithmetic.json goes")
+@click.option("--seeds", type=click.IntRange(1), default=3, show_default=True, help="Placements of each datapath")
+@click.option("--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True,
+              help="Runs of place and route at a time")
+def arithmetic(scenes, docs, seeds, jobs):
+    """Draw scenes and place datapaths in each arithmetic that a chip can have, and fill its table in docs/fpu.md."""
+    console = Console(stderr=True, highlight=False)
+    page = docs / "fpu.md"
+    with clear_errors():
+        place_of_table = between_markers(page, "arithmetic")
+        results = {"format": str(FORMAT), "size": list(SIZE), "grade": GRADE, "seeds": list(range(1, seeds + 1)),
+                   "tools": versions(), "pictures": _pictures(scenes, console),
+                   "datapaths": _areas(seeds, jobs, console)}
+        (docs / "results").mkdir(exist_ok=True)
+        with written_whole(docs / "results" / "arithmetic.json") as whole:
+            whole.write_text(json.dumps(results, indent=1) + "\n")
+        table = f"\n{_page(results)}\n"
+        with written_whole(page) as whole:
+            whole.write_text(place_of_table.sub(lambda match: table, page.read_text()))
