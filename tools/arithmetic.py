@@ -31,7 +31,10 @@ __all__ = ["arithmetic"]
 SIZE = 512, 384
 GRADE = 6
 FORMAT = FloatFormat(7, 16)
-DATAPATHS = {"transformation": affine_map, "kd-step": kd_step, "intersection": unit_triangle}
+#: Datapaths and the arithmetics in which what they are built of differs; what truncation saves is each operator's.
+DATAPATHS = {"transformation": (affine_map, ("separate", "fused", "fused-narrow")),
+             "kd-step": (kd_step, ("separate", "reciprocal", "table")),
+             "intersection": (unit_triangle, ("separate", "table"))}
 
 
 def _pictures(scenes, console):
@@ -60,11 +63,11 @@ def _pictures(scenes, console):
 def _areas(seeds, jobs, console):
     """Rows of datapath and arithmetic: what it takes alone, at the operators' default depths."""
     designs = {}
-    for name, datapath in DATAPATHS.items():
-        for arithmetic in ARITHMETICS:
-            component = datapath(FORMAT, arithmetic=arithmetic).component()
-            designs[name, arithmetic.name] = component.latency, ecp5.design_of(component,
-                                                                              name=f"{name}, {arithmetic.name}")
+    ways = {arithmetic.name: arithmetic for arithmetic in ARITHMETICS}
+    for name, (datapath, different) in DATAPATHS.items():
+        for way in different:
+            component = datapath(FORMAT, arithmetic=ways[way]).component()
+            designs[name, way] = component.latency, ecp5.design_of(component, name=f"{name}, {way}")
 
     def place(design):
         placements = [ecp5.place(design, grade=GRADE, seed=seed) for seed in range(1, seeds + 1)]
@@ -73,12 +76,10 @@ def _areas(seeds, jobs, console):
         return {"lut": first.lut, "ff": first.ff, "dsp": first.dsp, "ebr": first.ebr,
                 "fmax_worst_mhz": round(slowest, 1)}
 
-    # Where an arithmetic makes no difference to a datapath, its design is the same.
-    distinct = {design.folder: design for _, design in designs.values()}
     with ThreadPoolExecutor(jobs) as pool:
-        figures = dict(zip(distinct, pool.map(place, distinct.values()), strict=True))
-    return [{"datapath": name, "arithmetic": way, "latency": latency, **figures[design.folder]}
-            for (name, way), (latency, design) in designs.items()]
+        figures = pool.map(place, (design for _, design in designs.values()))
+        return [{"datapath": name, "arithmetic": way, "latency": latency, **found}
+                for ((name, way), (latency, _)), found in zip(designs.items(), figures, strict=True)]
 
 
 def _page(results):
@@ -89,11 +90,8 @@ def _page(results):
         ["scene: wrong pixels, PSNR", *names],
         [[scene, *(f"{pictures[scene, name]['wrong_pixels']:,}, {pictures[scene, name]['psnr_db']:.1f} dB"
                    for name in names)] for scene in scenes])]
-    rows = {}
-    for row in results["datapaths"]:
-        cells = [row["latency"], row["lut"], row["ff"], row["dsp"], row["ebr"], f"{row['fmax_worst_mhz']:.0f}"]
-        rows.setdefault((row["datapath"], *cells), []).append(row["arithmetic"])
-    rows = [[datapath, ", ".join(ways), *cells] for (datapath, *cells), ways in rows.items()]
+    rows = [[*(row[name] for name in ("datapath", "arithmetic", "latency", "lut", "ff", "dsp", "ebr")),
+             f"{row['fmax_worst_mhz']:.0f}"] for row in results["datapaths"]]
     tables.append(markdown_table(
         ["datapath", "arithmetic", "latency", "LUT", "FF", "DSP", "EBR", "MHz, worst"], rows))
     return "\n".join(tables)

@@ -9,22 +9,23 @@ from sim.machine import render_pysim
 from sim.model import render_model
 from sim.scene.compile import compile_scene
 
-from .scenes import instances_scene
+from .scenes import instances_scene, soup_scene
 
-FMT = FloatFormat(7, 16)
-SIZE = 10, 6
+FMT = FloatFormat(5, 8)
+SIZE = 4, 4
 
 
 @pytest.mark.parametrize("number", range(len(ARITHMETICS)), ids=[arithmetic.name for arithmetic in ARITHMETICS])
 def test_chip_is_model(number):
-    scene = instances_scene(1)
-    image = compile_scene(scene, fmt=FMT, flatten=False)
-    config = ChipConfig(fmt=FMT, arithmetic=number, num_threads=8, stack_depth=16, node_lines=16, list_lines=16,
-                        matrix_lines=16)
+    scene = soup_scene(1, count=12)
+    config = ChipConfig(fmt=FMT, arithmetic=number, num_threads=2, stack_depth=8, node_lines=8, list_lines=8,
+                        matrix_lines=8,
+                        mailbox_entries=0, add_latency=1, mul_latency=1, div_latency=2, cmp_latency=1)
+    image = compile_scene(scene, fmt=FMT, stack_depth=config.stack_depth)
     frame = render_pysim(image, scene.default_camera(), *SIZE, config=config)
     model = render_model(image, scene.default_camera(), *SIZE, config=config)
     assert not frame.differs(model).any()
-    assert (frame.prim_id >= 0).sum() > 10
+    assert (frame.prim_id >= 0).any()
 
 
 def test_they_differ():
