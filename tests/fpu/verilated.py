@@ -56,7 +56,8 @@ class Bank:
             r = Value.cast(operator.r) if hasattr(operator, "r") else Cat(operator.lt, operator.eq, operator.gt)
             results.append(Signal(32, name=f"r{index}"))
             m.d.comb += results[-1].eq(r)
-        (directory / "top.v").write_text(verilog.convert(m, ports=[a, b, *results], strip_internal_attrs=True))
+        (directory / "top.v").write_text(verilog.convert(m, ports=[a, b, *results], emit_src=False,
+                                                       strip_internal_attrs=True))
         samples = " ".join(f"results[{index}] = top.r{index};" for index in range(len(results)))
         (directory / "main.cpp").write_text(_MAIN.format(count=len(results), samples=samples))
 
