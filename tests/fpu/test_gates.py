@@ -6,13 +6,16 @@ from copy import deepcopy
 import numpy as np
 import pytest
 from amaranth.back import rtlil
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
 
 from boards.ecp5 import SYNTHESIS
 from boards.netlist import free_carry_ends
 from boards.toolchain import run_tool
 from fpu import Adder, Comparator, Divider, FloatFormat, Multiplier, Subtractor
 from tests.fpu import ECP5
-from tests.fpu.operands import all_pairs, structured_pairs
+from tests.fpu.operands import all_pairs, random_pairs, structured_pairs
 from tests.fpu.pairs import expected
 from tests.fpu.verilated import Bank, side_by_side
 
@@ -21,6 +24,20 @@ pytestmark = pytest.mark.xdist_group("gates")
 
 DEFAULT, TINY = FloatFormat(7, 16), FloatFormat(3, 2)
 CLASSES = [Adder, Subtractor, Multiplier, Divider, Comparator]
+
+
+class Sum(wiring.Component):
+    """r = a + b of bit patterns: a chain that is synthesised, into which a one must not come."""
+
+    fmt, latency = FloatFormat(4, 11), 0
+
+    def __init__(self):
+        super().__init__({"a": In(self.fmt), "b": In(self.fmt), "r": Out(self.fmt.width)})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.comb += self.r.eq(self.a.as_value() + self.b.as_value())
+        return m
 
 
 def block():
@@ -54,7 +71,7 @@ endmodule
 
 @pytest.fixture(scope="session")
 def operators():
-    return [cls(fmt, latency=latency) for fmt, latency in ((DEFAULT, None), (TINY, 0)) for cls in CLASSES]
+    return [Sum(), *(cls(fmt, latency=latency) for fmt, latency in ((DEFAULT, None), (TINY, 0)) for cls in CLASSES)]
 
 
 @pytest.fixture(scope="session")
@@ -105,3 +122,9 @@ def test_gates(bank, fmt, pairs):
         want = expected(operator, *pairs)
         wrong = np.flatnonzero(got != want)
         assert not wrong.size, (type(operator).__name__, len(wrong), *(hex(x[wrong[0]]) for x in (*pairs, got, want)))
+
+
+def test_a_chain_into_which_a_carry_could_come_is_not_freed(bank):
+    a, b = random_pairs(Sum.fmt, count=1_000, rng=np.random.default_rng(22))
+    (_, got), = bank.run(a, b, fmt=Sum.fmt)
+    assert (got == (a + b) % (1 << Sum.fmt.width)).all()
