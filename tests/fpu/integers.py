@@ -144,29 +144,34 @@ def reciprocal_square_root(a, *fmt, truncate=False):
     return _special(result, *fmt, zero=a.inf, infinite=a.zero, invalid=(a.sign == 1) & ~a.zero, sign=a.sign)
 
 
-def dot_product(a, b, c, *fmt, truncate=False):
+def dot_product(a, b, c, *fmt, window=None, truncate=False):
     """Σ a[i] * b[i] + c over rows ``a[i]`` and ``b[i]``, rounded once, in Python's integers.
 
-    +0 where a product is 0 * ∞ or there are infinities of both signs; an exact zero is -0 where all terms are.
+    0 * ∞ is a term +0; of infinities of both signs it is +0, and an exact zero is +0. With a ``window`` each term is
+    cut towards zero so many bits below the place of the highest exponent of a term that is not zero.
     """
     a, b, c = ([_Floats(bits, *fmt) for bits in rows] for rows in (a, b, [c]))
-    lowest = -(1 << fmt[0] - 1) - fmt[1]
-    total, negative, positive, all_negative = 0, False, False, True
-    invalid = False
+    # Of the last place of the smallest product
+    lowest = -(1 << fmt[0]) - 2 * fmt[1]
+    negative, positive = (np.zeros(c[0].sign.shape, bool) for _ in range(2))
+    terms, exps = [], []
     for x, y in [*zip(a, b, strict=True), (*c, None)]:
-        sign, sig, scale, infinite = x.sign, x.sig.astype(object), x.scale, x.inf
+        sign, sig, scale, infinite, zero = x.sign, x.sig.astype(object), x.scale, x.inf, x.zero
         if y is not None:
-            sign, sig, scale, infinite = sign ^ y.sign, sig * y.sig, scale + y.scale, infinite | y.inf
-            invalid |= infinite & (x.zero | y.zero)
-        total = total + ((-1) ** sign * sig << (scale - 2 * lowest).astype(object))
+            zero, infinite = zero | y.zero, infinite | y.inf
+            sign, sig, scale = sign ^ y.sign, sig * y.sig, scale + y.scale
+        infinite &= ~zero
         negative |= infinite & (sign == 1)
         positive |= infinite & (sign == 0)
-        all_negative &= sign == 1
+        terms.append((sign, np.where(zero, 0, sig) << (scale - lowest).astype(object)))
+        exps.append(np.where(zero, 0, scale - lowest + fmt[1] * (1 if y is None else 2)))
+    cut = 0 if window is None else np.maximum(np.max(exps, axis=0) - window, 0).astype(object)
+    total = sum((-1) ** sign * (magnitude >> cut << cut) for sign, magnitude in terms)
     magnitude = abs(total)
     drop = np.array([max(value.bit_length() - 48, 0) for value in magnitude])
     units = magnitude >> drop.astype(object)
     rest = (units << drop.astype(object) != magnitude).astype(bool)
-    result = _pack((total < 0).astype(np.int64), units.astype(np.int64), rest, 2 * lowest + drop, *fmt, truncate)
-    result = _special(result, *fmt, zero=(total == 0).astype(bool), sign=all_negative.astype(np.int64))
+    result = _pack((total < 0).astype(np.int64), units.astype(np.int64), rest, lowest + drop, *fmt, truncate)
+    result = _special(result, *fmt, zero=(total == 0).astype(bool))
     return _special(result, *fmt, infinite=negative | positive, sign=negative.astype(np.int64),
-                    invalid=invalid | negative & positive)
+                    invalid=negative & positive)

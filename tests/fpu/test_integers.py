@@ -45,32 +45,48 @@ def test_unary(name, fmt):
     same(name, fmt, members(fmt, np.arange(1 << fmt.width)) if fmt.width < 8 else operands(fmt)[0])
 
 
-def dot_product(a, b, c, *fmt, truncate):
+def exponent(magnitude):
+    """Largest power of two that is not above, or none of zero."""
+    if magnitude == 0:
+        return None
+    exp = magnitude.numerator.bit_length() - magnitude.denominator.bit_length()
+    return exp if Fraction(2) ** exp <= magnitude else exp - 1
+
+
+def dot_product(a, b, c, *fmt, window, truncate):
     """In fractions, of scalars."""
     terms = []
-    for pair in zip(a, b, strict=True):
-        (sign_a, x), (sign_b, y) = (reference.unpack(bits, *fmt) for bits in pair)
-        if (isinf(x) or isinf(y)) and (x == 0 or y == 0):
-            return 0
-        terms.append((sign_a ^ sign_b, inf if isinf(x) or isinf(y) else x * y))
-    terms.append(reference.unpack(c, *fmt))
-    infinite = {sign for sign, magnitude in terms if isinf(magnitude)}
+    for x_bits, y_bits in [*zip(a, b, strict=True), (c, None)]:
+        sign, x = reference.unpack(x_bits, *fmt)
+        y_sign, y = (0, Fraction(1)) if y_bits is None else reference.unpack(y_bits, *fmt)
+        if x == 0 or y == 0:
+            terms.append((0, Fraction(0), None))
+        elif isinf(x) or isinf(y):
+            terms.append((sign ^ y_sign, inf, None))
+        else:
+            terms.append((sign ^ y_sign, x * y, exponent(x) + exponent(y)))
+    infinite = {sign for sign, magnitude, _ in terms if isinf(magnitude)}
     if infinite:
         return reference.pack(*infinite, inf, *fmt) if len(infinite) == 1 else 0
-    total = sum(((-1) ** sign * magnitude for sign, magnitude in terms), Fraction(0))
-    sign = int(total < 0) if total else int(all(sign for sign, _ in terms))
-    return reference.pack(sign, abs(total), *fmt, truncate=truncate)
+    highest = max((exp for _, _, exp in terms if exp is not None), default=0)
+    unit = Fraction(2) ** (-4000 if window is None else highest - window)
+    total = sum((-1) ** sign * (magnitude // unit * unit) for sign, magnitude, _ in terms)
+    return reference.pack(int(total < 0), abs(total), *fmt, truncate=truncate)
 
 
 @pytest.mark.parametrize("truncate", [False, True])
+@pytest.mark.parametrize("windows", [lambda fmt: None, lambda fmt: 2 * fmt.frac_width, lambda fmt: fmt.frac_width + 2],
+                         ids=["exact", "wide", "narrow"])
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
-def test_dot_product(fmt, truncate):
+def test_dot_product(fmt, windows, truncate):
     rng = np.random.default_rng(12)
-    pairs = [structured_pairs(fmt, count=2_000, rng=rng) for _ in range(4)]
+    pairs = [structured_pairs(fmt, count=1_000, rng=rng) for _ in range(4)]
+    # Terms that cancel
+    pairs[1][0][::3], pairs[1][1][::3] = pairs[0][0][::3] ^ 1 << fmt.width - 1, pairs[0][1][::3] ^ 1
     (a, b), c = zip(*pairs[:3], strict=True), pairs[3][0]
-    parameters = fmt.exp_width, fmt.frac_width
-    got = integers.dot_product(a, b, c, *parameters, truncate=truncate)
-    want = [dot_product(*rows, *parameters, truncate=truncate) for rows in
+    parameters, choice = (fmt.exp_width, fmt.frac_width), {"window": windows(fmt), "truncate": truncate}
+    got = integers.dot_product(a, b, c, *parameters, **choice)
+    want = [dot_product(*rows, *parameters, **choice) for rows in
             zip(zip(*(row.tolist() for row in a), strict=True), zip(*(row.tolist() for row in b), strict=True),
                 c.tolist(), strict=True)]
     assert got.tolist() == want

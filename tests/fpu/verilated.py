@@ -70,14 +70,16 @@ def _compile(sources, folder, optimise):
 def side_by_side(operators):
     """Module of all ``operators``, with the same operands, and its ports ``a``, ``b``, ``r0``, ``r1`` …, 32 bits each.
 
-    An operator is any component with members ``a``, ``b``, ``r`` (or ``lt, eq, gt``).
+    An operator is any component with members ``a``, ``b`` unless it is unary, and ``r`` (or ``lt, eq, gt``).
     """
     m = Module()
     a, b = Signal(32, name="a"), Signal(32, name="b")
     results = []
     for index, operator in enumerate(operators):
         m.submodules[f"operator_{index}"] = operator
-        m.d.comb += [Value.cast(operator.a).eq(a), Value.cast(operator.b).eq(b)]
+        m.d.comb += Value.cast(operator.a).eq(a)
+        if hasattr(operator, "b"):
+            m.d.comb += Value.cast(operator.b).eq(b)
         r = Value.cast(operator.r) if hasattr(operator, "r") else Cat(operator.lt, operator.eq, operator.gt)
         results.append(Signal(32, name=f"r{index}"))
         m.d.comb += results[-1].eq(r)
