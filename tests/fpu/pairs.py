@@ -8,7 +8,18 @@ from pathlib import Path
 import click
 import numpy as np
 
-from fpu import Adder, Comparator, Divider, Multiplier, Rounding, Subtractor
+from fpu import (
+    Adder,
+    Comparator,
+    Divider,
+    Multiplier,
+    Reciprocal,
+    ReciprocalSquareRoot,
+    Rounding,
+    SquareRoot,
+    Subtractor,
+    TableDivider,
+)
 from tests.fpu import integers
 from tests.fpu.operands import random_pairs, structured_pairs
 from tests.fpu.verilated import Bank
@@ -16,15 +27,21 @@ from tools.errors import written_whole
 from tools.options import FORMAT
 
 EXACT = {Adder: integers.add, Subtractor: integers.subtract, Multiplier: integers.multiply, Divider: integers.divide,
-         Comparator: integers.order}
+         TableDivider: integers.divide, Comparator: integers.order, Reciprocal: integers.reciprocal,
+         SquareRoot: integers.square_root, ReciprocalSquareRoot: integers.reciprocal_square_root}
 _BATCH = 1 << 19
 _SHOWN = 8
 
 
+def roundings(cls):
+    """What the operators of a class may be told of rounding, as keyword arguments."""
+    emulation = getattr(cls, "emulation", {})
+    return [{"rounding": rounding} for rounding in emulation] if len(emulation) > 1 else [{}]
+
+
 def all_operators(fmt):
-    """Each operator at its default latency, with each rounding where it rounds."""
-    return [cls(fmt) if cls is Comparator else cls(fmt, rounding=rounding)
-            for cls in EXACT for rounding in Rounding if cls is not Comparator or rounding is Rounding.NEAREST_EVEN]
+    """Each operator at its default latency, with each rounding there is."""
+    return [cls(fmt, **choice) for cls in EXACT for choice in roundings(cls)]
 
 
 def describe(operator):
@@ -34,9 +51,10 @@ def describe(operator):
 
 
 def expected(operator, a, b):
-    """Exact results on bit patterns."""
+    """Exact results on bit patterns, of ``a`` alone if the operator is unary."""
+    operands = [a, b] if hasattr(operator, "b") else [a]
     choice = {} if isinstance(operator, Comparator) else {"truncate": operator.rounding is Rounding.TRUNCATE}
-    return EXACT[type(operator)](a, b, operator.fmt.exp_width, operator.fmt.frac_width, **choice)
+    return EXACT[type(operator)](*operands, operator.fmt.exp_width, operator.fmt.frac_width, **choice)
 
 
 def mismatches(bank, fmt, *, pairs, seed):
