@@ -5,8 +5,8 @@ The same functions as in :mod:`tests.fpu.reference`, for millions of operands; f
 
 import numpy as np
 
-__all__ = ["add", "divide", "dot_product", "multiply", "order", "reciprocal", "reciprocal_square_root", "square_root",
-           "subtract"]
+__all__ = ["add", "divide", "dot_product", "maximum", "minimum", "multiply", "order", "reciprocal",
+           "reciprocal_square_root", "square_root", "subtract"]
 
 
 class _Floats:
@@ -103,6 +103,14 @@ def order(a, b, *fmt):
     x, y = (np.where(bits >> fmt[1] & (1 << fmt[0]) - 1 == 0, 0, bits & (1 << places) - 1) * (-1) ** (bits >> places)
             for bits in (a, b))
     return np.where(x < y, 1, np.where(x == y, 2, 4))
+
+
+def minimum(a, b, *fmt, truncate=False):
+    return np.where(order(a, b, *fmt) == 1, a, b)
+
+
+def maximum(a, b, *fmt, truncate=False):
+    return np.where(order(a, b, *fmt) == 4, a, b)
 
 
 def reciprocal(a, *fmt, truncate=False):

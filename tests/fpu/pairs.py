@@ -12,6 +12,8 @@ from fpu import (
     Adder,
     Comparator,
     Divider,
+    Maximum,
+    Minimum,
     Multiplier,
     Reciprocal,
     ReciprocalSquareRoot,
@@ -27,7 +29,8 @@ from tools.errors import written_whole
 from tools.options import FORMAT
 
 EXACT = {Adder: integers.add, Subtractor: integers.subtract, Multiplier: integers.multiply, Divider: integers.divide,
-         TableDivider: integers.divide, Comparator: integers.order, Reciprocal: integers.reciprocal,
+         TableDivider: integers.divide, Comparator: integers.order, Minimum: integers.minimum,
+         Maximum: integers.maximum, Reciprocal: integers.reciprocal,
          SquareRoot: integers.square_root, ReciprocalSquareRoot: integers.reciprocal_square_root}
 _BATCH = 1 << 19
 _SHOWN = 8

@@ -11,7 +11,7 @@ from tests.fpu import integers, reference
 from tests.fpu.operands import all_pairs, members, random_pairs, structured_pairs
 
 FORMATS = [FloatFormat(2, 3), FloatFormat(3, 2), FloatFormat(5, 10), FloatFormat(7, 16), FloatFormat(8, 23)]
-BINARY = ["add", "subtract", "multiply", "divide", "order"]
+BINARY = ["add", "subtract", "multiply", "divide", "order", "minimum", "maximum"]
 UNARY = ["reciprocal", "square_root", "reciprocal_square_root"]
 
 
