@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light fpu-report arithmetic clean
+.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -13,6 +13,7 @@ help:
 	@echo "make first-light  the figures of docs/first-light.md, from the scenes in SCENES=$(SCENES)"
 	@echo "make fpu-report   the figures of docs/fpu.md: every operator placed and routed; PEER=FILE puts others' beside ours"
 	@echo "make arithmetic   what fused sums, tables and truncation do to pictures and datapaths, for docs/fpu.md"
+	@echo "make fpu-pairs    ten million pairs through every operator, against exact integers: docs/results/fpu_pairs.json"
 
 setup: $(VENV)/.ready
 
@@ -40,6 +41,9 @@ fpu-report: setup
 
 arithmetic: setup
 	$(BIN)/dynrt arithmetic --scenes $(SCENES)
+
+fpu-pairs: setup
+	$(BIN)/python -m tests.fpu.pairs --output docs/results/fpu_pairs.json
 
 clean:
 	rm -rf build .pytest_cache .ruff_cache

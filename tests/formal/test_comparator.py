@@ -1,29 +1,29 @@
-"""The comparator is a total order of values, for every three numbers of a small format."""
+"""The comparator is a total order of values, for every three numbers of a small format and of a large one."""
 
+import pytest
 from amaranth.hdl import Assert, Assume, Module, Signal
 
 from fpu import Comparator, FloatFormat
 from tests.formal.prove import prove
 
-FMT = FloatFormat(3, 2)
 
-
-def test_total_order(tmp_path):
+@pytest.mark.parametrize("fmt", [FloatFormat(3, 2), FloatFormat(7, 16)], ids=str)
+def test_total_order(fmt, tmp_path):
     m = Module()
-    numbers = [Signal(FMT.width, name=name) for name in "abc"]
+    numbers = [Signal(fmt.width, name=name) for name in "abc"]
     order = {}
     for number in numbers:
-        view = FMT(number)
+        view = fmt(number)
         # Infinity has one pattern of each sign.
         m.d.comb += Assume(~view.exp.all() | (view.frac == 0))
     for i in range(3):
         for j in range(3):
-            m.submodules[f"compare{i}{j}"] = order[i, j] = compare = Comparator(FMT, latency=0)
+            m.submodules[f"compare{i}{j}"] = order[i, j] = compare = Comparator(fmt, latency=0)
             m.d.comb += [
-                compare.a.eq(FMT(numbers[i])), compare.b.eq(FMT(numbers[j])),
+                compare.a.eq(fmt(numbers[i])), compare.b.eq(fmt(numbers[j])),
                 Assert(compare.lt + compare.eq + compare.gt == 1),
             ]
-    a, b = (FMT(number) for number in numbers[:2])
+    a, b = (fmt(number) for number in numbers[:2])
     m.d.comb += [
         Assert(order[0, 0].eq),
         Assert(order[0, 1].lt == order[1, 0].gt),

