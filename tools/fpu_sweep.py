@@ -19,7 +19,7 @@ __all__ = ["DEFAULT_FORMAT", "FORMATS", "Point", "measure", "peer_points", "swee
 
 DEFAULT_FORMAT = FloatFormat(7, 16)
 FORMATS = tuple(map(FloatFormat.parse, (
-    "5.8", "5.10", "6.12", "6.14", "7.12", "7.14", "7.16", "7.18", "7.20", "8.23")))
+    "5.8", "5.10", "6.12", "7.14", "7.16", "7.20", "8.23")))
 #: Latencies beyond the default that are measured too.
 BEYOND = 2
 
