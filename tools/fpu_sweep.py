@@ -51,9 +51,9 @@ class Point:
 
 
 def _latencies(default):
-    """Each up to a few, further on every second, and around the default."""
-    few = min(4, default + BEYOND)
-    return sorted({*range(few + 1), *range(few, default + BEYOND + 1, 2), default})
+    """The first few, a handful between them and the default, and one beyond."""
+    spacing = max(2, default // 8 * 2)
+    return sorted({0, 1, *range(2, default, spacing), default, default + BEYOND})
 
 
 def sweep(entry):
