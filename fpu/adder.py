@@ -130,7 +130,7 @@ class Adder(BinaryOperator):
                              s.subtract))[1:]
         s = step("add", magnitude=total, negative=total[-1] & s.subtract, sticky=s.sticky, exp=s.big_exp,
                  subtract=s.subtract, zero=s.zero, inf=s.inf, sign=s.sign)
-        s = normalise(step, SimpleNamespace(**vars(s)))
+        s = normalise(step, s)
         sum_sign = s.sign ^ s.negative
         # An exact zero
         cancelled = ~(s.sig[-2:] | s.shifted[-2:]).any() & ~s.inf

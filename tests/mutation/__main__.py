@@ -36,7 +36,7 @@ class Broken(Exception):
 def run_tests(folder):
     """Name of the first test that fails in a copy of the tree, or None."""
     environment = {**os.environ, "PYTHONPATH": str(folder), "DYNRT_CACHE": str(folder / "cache")}
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist",
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n0", "-p", "no:cacheprovider",
                "--basetemp", str(folder / "temporary"), *TESTS]
     try:
         result = subprocess.run(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -51,21 +51,20 @@ def run_tests(folder):
     return None
 
 
-def copied(folder):
-    """The tree in ``folder``, without what was compiled."""
+def copy_tree(source, target):
+    """What the tests need of the tree, without what was compiled."""
     for name in _COPIED:
-        source = ROOT / name
-        if source.is_dir():
-            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        if (source / name).is_dir():
+            shutil.copytree(source / name, target / name, ignore=shutil.ignore_patterns("__pycache__"))
         else:
-            shutil.copy(source, folder / name)
-    return folder
+            shutil.copy(source / name, target / name)
 
 
-def killed_by(fault):
-    """Name of the test that finds a fault, or None; no fault at all is to be found by none."""
+def killed_by(fault, tree):
+    """Name of the test that finds a fault in ``tree``, or None; no fault at all is to be found by none."""
     with tempfile.TemporaryDirectory() as temporary:
-        folder = copied(Path(temporary))
+        folder = Path(temporary)
+        copy_tree(tree, folder)
         if fault:
             path = folder / fault.file
             text = path.read_text()
@@ -88,14 +87,18 @@ def main(only, jobs, output):
 
     def attempt(fault):
         try:
-            found = killed_by(fault)
+            found = killed_by(fault, tree)
         except Broken as error:
             raise Failure(f"{fault.file}: {fault.what}: {error}" if fault else
                           f"the tests of the operators cannot be run: {error}") from error
-        console.print(f"{fault.file}: {fault.what}: {found or 'SURVIVED'}" if fault else "no fault", highlight=False)
+        console.print(f"{fault.file}: {fault.what}: {found or 'SURVIVED'}" if fault else "no fault",
+                      highlight=False, soft_wrap=True)
         return found
 
-    with ThreadPoolExecutor(jobs) as pool:
+    with tempfile.TemporaryDirectory() as temporary, ThreadPoolExecutor(jobs) as pool:
+        # All of the same tree, whatever happens to it meanwhile
+        tree = Path(temporary)
+        copy_tree(ROOT, tree)
         # The operators as they are first, lest a test that always fails find everything.
         unharmed, *found = pool.map(attempt, [None, *faults])
     if unharmed:
