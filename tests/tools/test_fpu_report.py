@@ -60,9 +60,9 @@ def peer_file(folder, peers):
 
 def test_one_operator_and_a_peer(docs, tmp_path, monkeypatch):
     monkeypatch.setattr(fpu_sweep, "FORMATS", (FloatFormat(3, 2), FloatFormat(7, 16)))
-    # Of the latencies only 0 and the default
+    # Of the latencies only 0; the default is there by its format
     default = OPERATORS["Multiplier"].default_latency(FloatFormat(7, 16))
-    monkeypatch.setattr(fpu_sweep, "BEYOND", -default)
+    monkeypatch.setattr(fpu_sweep, "_latencies", lambda default: [0])
     arguments = ["--only", "Multiplier", "--seeds", 1, "--peer", peer_file(tmp_path, [PEER])]
     result = run(docs, *arguments)
     assert result.exit_code == 0, result.text
