@@ -34,11 +34,11 @@ def round_and_pack(step, m, s, *, fmt, rounding):
     m.d.comb += [above_two.eq(Mux(s.shifts, shifted[-1], sig[-1])),
                  guard.eq(Mux(s.shifts, shifted[:2], sig[:2])),
                  sticky.eq(s.sticky | Mux(s.shifts, s.shifted[:below].any(), s.sig[:below].any()))]
-    injected, tie = s.negative, Const(0)
+    injected, tie = [(ChainBit.ADD, guard, Cat(~above_two & s.negative, above_two & s.negative), 0)], Const(0)
     if rounding is Rounding.NEAREST_EVEN:
         # Half a unit is injected whichever place it has, without waiting for sticky; a tie that this has brought to
-        # an odd fraction was even before, so clearing the last bit mends it.
-        injected = Const(1, 1)
+        # an odd fraction was even before, so clearing the last bit mends it. The chain's own table inverts.
+        injected = [(ChainBit.SUBTRACT, guard[0], above_two, 0), (ChainBit.ADD, guard[1], above_two, 0)]
         tie = ~sticky & Mux(above_two, guard == 0b10, guard[0])
     if hasattr(s, "exp_above"):
         base, added = s.exp_above, (~above_two).as_signed()
@@ -49,8 +49,7 @@ def round_and_pack(step, m, s, *, fmt, rounding):
     m.d.comb += [exp.eq(base), offset.eq(added)]
     # In one chain the carry out of the significand is the increment of the exponent.
     rounded = carry_chain(
-        m, "rounding",
-        (ChainBit.ADD, guard, Cat(~above_two & injected, above_two & injected), 0),
+        m, "rounding", *injected,
         (ChainBit.CHOOSE, shifted[2:-1], sig[2:-1], s.shifts),
         (ChainBit.ADD, exp, offset, 0))
     s = step("round", sig=rounded[:fmt.sig_width + 1], exp=rounded[fmt.sig_width + 1:].as_signed(), tie=tie,
