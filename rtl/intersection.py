@@ -12,12 +12,13 @@ from .layout import PACKET_RAYS, thread_width, token_layout, vector_layout, with
 __all__ = ["Intersection", "hit_layout", "unit_triangle"]
 
 
-def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0]):
+def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], limited=False):
     """t = −O′z / D′z, u = O′x + t·D′x, v = O′y + t·D′y; ``hit`` if 0 < t < ∞, u ≥ 0, v ≥ 0 and u + v ≤ 1.
 
-    ``nearer`` if t < t_hit, which comes in just in time, as late as t is known (paper §2.1.2).
+    ``nearer`` if t < t_hit, which comes in just in time, as late as t is known (paper §2.1.2). For rays that are
+    ``limited`` it is t_near < t instead of 0 < t.
 
-    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator.
+    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator, and one more if limited.
     """
     dp = Datapath(fmt, latencies=latencies, **arithmetic.parameters)
     origin, direction = dp.vector("origin"), dp.vector("direction")
@@ -25,7 +26,10 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0]):
     t_hit = dp.input("t_hit", delay=dp.arrival(t))
     u = dp.add(origin.x, dp.mul(t, direction.x))
     v = dp.add(origin.y, dp.mul(t, direction.y))
-    ahead = dp.logical_and(dp.is_finite(t), dp.logical_not(dp.sign(t)), dp.logical_not(dp.is_zero(t)))
+    if limited:
+        ahead = dp.logical_and(dp.is_finite(t), dp.lt(dp.input("t_near", delay=dp.arrival(t)), t))
+    else:
+        ahead = dp.logical_and(dp.is_finite(t), dp.logical_not(dp.sign(t)), dp.logical_not(dp.is_zero(t)))
     inside = dp.logical_and(dp.logical_not(dp.is_negative(u)), dp.logical_not(dp.is_negative(v)),
                             dp.is_at_most_one(dp.add(u, v)))
     dp.output("t", t)

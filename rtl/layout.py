@@ -93,9 +93,13 @@ def node_layout(*, fmt, index_width):
 
 
 def list_entry_layout(*, index_width):
-    """A leaf's list entry of 4 bytes: a triangle's or an instance's matrix number, and whether it is the last."""
+    """A leaf's list entry of 4 bytes: a triangle's or an instance's matrix number, and whether it is the last.
+
+    ``solid``: a triangle that lets no light through.
+    """
     return data.FlexibleLayout(32, {
         "index": data.Field(index_width, 0),
+        "solid": data.Field(1, 29),
         "instance": data.Field(1, 30),
         "last": data.Field(1, 31),
     })
