@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from fpu import FloatFormat
 
 from .arithmetic import ARITHMETICS
+from .microcode import Program
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,14 @@ class ChipConfig:
         Bits of a pixel coordinate.
     arithmetic : int
         Which of :data:`~rtl.arithmetic.ARITHMETICS` it computes by.
+    num_pipelines : int
+        Pipelines behind one ray generation controller, 1…4.
+    program : :class:`~rtl.microcode.Program`, optional
+        What the shader does; without, triangles have one colour each and no rays but the primary ones.
+    ray_stack_depth : int
+        Registers on the stack of a ray in the shader.
+    shading_lines, texture_lines, texture_line_items : int
+        Lines of the shader's caches, if it has them: of records, of which one is a line, and of texels.
 
     Raises
     ------
@@ -63,6 +72,12 @@ class ChipConfig:
     index_width: int = 24
     coord_width: int = 12
     arithmetic: int = 0
+    num_pipelines: int = 1
+    program: Program | None = None
+    ray_stack_depth: int = 32
+    shading_lines: int = 128
+    texture_lines: int = 256
+    texture_line_items: int = 4
 
     def __post_init__(self):
         ranges = {
@@ -71,13 +86,15 @@ class ChipConfig:
             "node_lines": (2, 1 << 16), "node_line_items": (1, 8), "list_lines": (2, 1 << 16),
             "list_line_items": (1, 16), "matrix_lines": (2, 1 << 16), "num_fetches": (1, 16),
             "index_width": (8, 24), "coord_width": (4, 14),
-            "arithmetic": (0, len(ARITHMETICS) - 1),
+            "arithmetic": (0, len(ARITHMETICS) - 1), "num_pipelines": (1, 4), "ray_stack_depth": (1, 256),
+            "shading_lines": (2, 1 << 16), "texture_lines": (2, 1 << 16), "texture_line_items": (1, 16),
         }
         for name, (low, high) in ranges.items():
             value = getattr(self, name)
             if not low <= value <= high:
                 raise ValueError(f"{name} is {value}; it must be from {low} to {high}")
-        for name in ("node_lines", "list_lines", "matrix_lines", "node_line_items", "list_line_items"):
+        for name in ("node_lines", "list_lines", "matrix_lines", "node_line_items", "list_line_items",
+                     "shading_lines", "texture_lines", "texture_line_items"):
             if getattr(self, name).bit_count() != 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be a power of two")
 

@@ -8,7 +8,7 @@ __all__ = ["Counters"]
 
 
 class Counters(wiring.Component):
-    """Counts the cycles in which each event is set.
+    """Counts how often each event happens.
 
     Parameters
     ----------
@@ -16,18 +16,20 @@ class Counters(wiring.Component):
         The events.
     width : int
         Bits of a count, which wraps.
+    num_sources : int
+        How often an event may happen in one cycle.
 
     Members
     -------
     clear : all counts become zero
-    event_NAME, NAME : an event, how often it was
+    event_NAME, NAME : how often an event happens in this cycle, how often it has
     """
 
-    def __init__(self, names, *, width=32):
+    def __init__(self, names, *, width=32, num_sources=1):
         self.names = tuple(names)
         super().__init__({
             "clear": In(1),
-            **{f"event_{name}": In(1) for name in self.names},
+            **{f"event_{name}": In(range(num_sources + 1)) for name in self.names},
             **{name: Out(width) for name in self.names},
         })
 
@@ -37,6 +39,6 @@ class Counters(wiring.Component):
             count = getattr(self, name)
             with m.If(self.clear):
                 m.d.sync += count.eq(0)
-            with m.Elif(getattr(self, f"event_{name}")):
-                m.d.sync += count.eq(count + 1)
+            with m.Else():
+                m.d.sync += count.eq(count + getattr(self, f"event_{name}"))
         return m

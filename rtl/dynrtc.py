@@ -1,47 +1,25 @@
-"""DynRTC, the dynamic ray-tracing core: the units of the paper's figure 2 and the paths between them."""
+"""DynRTC, the dynamic ray-tracing core: pipelines behind one ray generation controller and one memory."""
 
-from amaranth.hdl import Module, Signal
+from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
-from amaranth.utils import exact_log2
 
-from .arithmetic import ARITHMETICS
-from .cache import WORD_WIDTH, Cache
+from .cache import WORD_WIDTH
 from .config import ChipConfig
 from .counters import Counters
-from .intersection import Intersection
-from .layout import NODE_BITS, camera_layout, matrix_layout, thread_width, token_layout, with_token
-from .mailboxed_list import MailboxedList
-from .queue import Merge, Queue
+from .dynrtp import UNITS, DynRTP, memory_ports
+from .layout import camera_layout
+from .line_sharing import LineSharing
+from .queue import Merge
 from .ray_generation import RayGeneration
-from .ray_store import RayStore
-from .stack import TraversalStack
-from .transformation import Transformation
-from .traversal import Traversal
-from .write_out import WriteOut, pixel_layout
+from .write_out import WriteOut
 
-__all__ = ["CACHES", "COUNTERS", "UNITS", "DynRTC", "line_words"]
-
-#: The three caches, by what they keep.
-CACHES = ("nodes", "lists", "matrices")
-
-#: What the chip counts: cycles, packets and rays, busy cycles of each unit, hits and misses of each cache.
-COUNTERS = ("cycles", "packets", "busy_traversal", "busy_list", "busy_transformation", "busy_intersection",
-            *(f"{event}_{cache}" for cache in CACHES for event in ("hit", "miss")))
-
-#: Where a thread can be, in the order of the bits of ``probe``.
-UNITS = ("ray generation", "node cache", "traversal", "stack", "list cache", "mailboxed list", "matrix cache",
-         "transformation", "intersection", "write-out")
+__all__ = ["DynRTC", "counter_names"]
 
 
-def line_words(config):
-    """Words in a line of each of a chip's memories: what one request asks for."""
-    return {
-        "nodes": config.node_line_items * NODE_BITS // WORD_WIDTH,
-        "lists": config.list_line_items,
-        "matrices": -(-matrix_layout(config.fmt).size // WORD_WIDTH),
-        "shading": 1,
-    }
+def counter_names(config):
+    """What a chip counts: cycles, and the events of all its pipelines."""
+    return ("cycles", *DynRTP.event_names(config))
 
 
 class DynRTC(wiring.Component):
@@ -57,229 +35,98 @@ class DynRTC(wiring.Component):
     start : draw a picture; only while ``ready``
     ready : the last picture is drawn
     camera, root, width, height, background : the picture; constant while it is drawn
-    nodes_request, nodes_data : the node memory, see :class:`~rtl.cache.Cache`
-    lists_request, lists_data : the list memory
-    matrices_request, matrices_data : the matrix memory
-    shading_request, shading_data : the shading memory, a word a triangle
+    NAME_request, NAME_data : for each of :func:`~rtl.dynrtp.memory_ports`, line numbers and words that come back
     pixel : stream of pixels
-    counters : one 32-bit count for each of :data:`COUNTERS`
-    probe : for each of :data:`UNITS`, whether a thread enters it, and which
+    counters : one 32-bit count for each of :func:`counter_names`
+    probe : for each unit of each pipeline, see :class:`~rtl.dynrtp.DynRTP`
     """
 
     def __init__(self, config=None):
         self.config = config = ChipConfig() if config is None else config
-        self._token = token_layout(num_threads=config.num_threads, stack_depth=config.stack_depth)
-        self._node = with_token(self._token, node=config.index_width)
-        self._place = with_token(self._token, list=config.index_width)
-        self._job = with_token(self._token, index=config.index_width, instance=1)
-        fmt = config.fmt
-        word = stream.Signature(WORD_WIDTH, always_ready=True)
+        self._pipelines = [DynRTP(config) for _ in range(config.num_pipelines)]
+        self._names = counter_names(config)
+        pipeline = self._pipelines[0]
         members = {}
-        line_items = dict(nodes=config.node_line_items, lists=config.list_line_items, matrices=1)
-        for name in CACHES:
-            line_width = config.index_width - exact_log2(line_items[name])
+        for name, (_, line_width) in memory_ports(config).items():
             members[f"{name}_request"] = Out(stream.Signature(line_width))
-            members[f"{name}_data"] = In(word)
+            members[f"{name}_data"] = In(stream.Signature(WORD_WIDTH, always_ready=True))
         super().__init__({
             "start": In(1),
             "ready": Out(1),
-            "camera": In(camera_layout(fmt)),
+            "camera": In(camera_layout(config.fmt)),
             "root": In(config.index_width),
             "width": In(config.coord_width),
             "height": In(config.coord_width),
             "background": In(24),
             **members,
-            "shading_request": Out(stream.Signature(config.index_width)),
-            "shading_data": In(word),
-            "pixel": Out(stream.Signature(pixel_layout(fmt=fmt, index_width=config.index_width,
-                                                       coord_width=config.coord_width))),
-            "counters": Out(data.StructLayout({name: 32 for name in COUNTERS})),
-            "probe": Out(data.ArrayLayout(data.StructLayout({"valid": 1, "thread": thread_width(config.num_threads)}),
-                                          len(UNITS))),
+            "pixel": Out(pipeline.pixel.signature),
+            "counters": Out(data.StructLayout({name: 32 for name in self._names})),
+            "probe": Out(data.ArrayLayout(pipeline.probe.shape().elem_shape, len(UNITS) * config.num_pipelines)),
         })
-
-    def _queue(self, m, name, source, shape):
-        """A queue after ``source``, with room for every thread's token."""
-        queue = Queue(shape, depth=self.config.num_threads, always_ready=True)
-        m.submodules[f"{name}_queue"] = queue
-        m.d.comb += [queue.i.payload.eq(source.payload), queue.i.valid.eq(source.valid)]
-        return queue.o
-
-    def _merge(self, m, name, sources, shape):
-        merge = Merge(shape, num_inputs=len(sources))
-        m.submodules[f"{name}_merge"] = merge
-        for source, target in zip(sources, merge.i, strict=True):
-            wiring.connect(m, source, target)
-        return merge.o
 
     def elaborate(self, platform):
         m = Module()
-        config = self.config
-        fmt = config.fmt
-        token = dict(num_threads=config.num_threads, stack_depth=config.stack_depth)
-        widths = dict(**token, index_width=config.index_width)
-        floats = dict(fmt=fmt, latencies=config.latencies)
-        computing = dict(**floats, arithmetic=ARITHMETICS[config.arithmetic])
-        cache = dict(num_waiting=config.num_threads, num_fetches=config.num_fetches, index_width=config.index_width)
-        caches = {
-            "nodes": Cache(item_width=NODE_BITS, payload_shape=self._token, num_lines=config.node_lines,
-                           line_items=config.node_line_items, **cache),
-            "lists": Cache(item_width=WORD_WIDTH, payload_shape=self._place, num_lines=config.list_lines,
-                           line_items=config.list_line_items, **cache),
-            "matrices": Cache(item_width=matrix_layout(fmt).size, payload_shape=self._job,
-                              num_lines=config.matrix_lines, **cache),
-        }
-        rays = RayGeneration(**token, coord_width=config.coord_width)
-        store = RayStore(fmt=fmt, num_threads=config.num_threads)
-        stack = TraversalStack(**floats, **widths)
-        traversal = Traversal(**computing, **widths)
-        mailboxed_list = MailboxedList(mailbox_entries=config.mailbox_entries, **widths)
-        transformation = Transformation(**computing, coord_width=config.coord_width, **widths)
-        intersection = Intersection(**computing, **widths)
-        write_out = WriteOut(fmt=fmt, coord_width=config.coord_width, **widths)
-        for name, cache in caches.items():
-            m.submodules[f"{name}_cache"] = cache
-            wiring.connect(m, cache.line_request, wiring.flipped(getattr(self, f"{name}_request")))
-            wiring.connect(m, wiring.flipped(getattr(self, f"{name}_data")), cache.line_data)
-        m.submodules.ray_generation = rays
-        m.submodules.ray_store = store
-        m.submodules.stack = stack
-        m.submodules.traversal = traversal
-        m.submodules.mailboxed_list = mailboxed_list
-        m.submodules.transformation = transformation
-        m.submodules.intersection = intersection
-        m.submodules.write_out = write_out
-
-        # Nodes to visit come from a step, from the stack, and from rays that begin.
-        visits = self._merge(m, "visit", [
-            self._queue(m, "child", traversal.child, self._node),
-            self._queue(m, "resume", stack.resume, self._node),
-            self._queue(m, "start", transformation.start, self._node),
-        ], self._node)
-        nodes = caches["nodes"]
-        m.d.comb += [
-            nodes.request.valid.eq(visits.valid),
-            nodes.request.payload.index.eq(visits.payload.node),
-            nodes.request.payload.payload.eq(visits.payload.token),
-            visits.ready.eq(nodes.request.ready),
-            traversal.node.valid.eq(nodes.response.valid),
-            traversal.node.payload.eq(nodes.response.payload),
-            nodes.response.ready.eq(1),
-        ]
-
-        wiring.connect(m, self._queue(m, "leaf", traversal.leaf, self._place), mailboxed_list.leaf)
-        wiring.connect(m, mailboxed_list.fetch, caches["lists"].request)
-        wiring.connect(m, caches["lists"].response, mailboxed_list.entry)
-        jobs = self._queue(m, "job", mailboxed_list.job, self._job)
-        matrices = caches["matrices"]
-        m.d.comb += [
-            matrices.request.valid.eq(jobs.valid),
-            matrices.request.payload.index.eq(jobs.payload.index),
-            matrices.request.payload.payload.eq(jobs.payload),
-            jobs.ready.eq(matrices.request.ready),
-        ]
-        wiring.connect(m, matrices.response, transformation.matrix)
-        wiring.connect(m, transformation.vector, intersection.vector)
-        wiring.connect(m, self._queue(m, "tested", intersection.tested, self._token), mailboxed_list.tested)
-
-        pops = self._merge(m, "pop", [
-            self._queue(m, "nowhere", traversal.pop, self._token),
-            self._queue(m, "list_end", mailboxed_list.pop, self._token),
-        ], self._token)
-        wiring.connect(m, pops, stack.pop)
-
-        # An instance that is left goes on with its list; a packet that is left is drawn.
-        left, drawn = (stream.Signature(self._token, always_ready=True).create(path=(name,))
-                       for name in ("left", "drawn"))
-        m.d.comb += [
-            left.payload.eq(stack.exhausted.payload),
-            left.payload.level.eq(0),
-            left.valid.eq(stack.exhausted.valid & stack.exhausted.payload.level),
-            drawn.payload.eq(stack.exhausted.payload),
-            drawn.valid.eq(stack.exhausted.valid & ~stack.exhausted.payload.level),
-        ]
-        wiring.connect(m, self._queue(m, "left", left, self._token), mailboxed_list.left)
-        wiring.connect(m, self._queue(m, "drawn", drawn, self._token), write_out.packet)
-        wiring.connect(m, write_out.finished, rays.finished)
-        wiring.connect(m, rays.primary, transformation.primary)
-
-        # What goes between units without waiting.
-        m.d.comb += [
-            store.write.eq(transformation.write),
-            store.vector_address.eq(transformation.vector_address),
-            transformation.stored_vector.eq(store.vector),
-            store.step_address.eq(traversal.step_address),
-            traversal.step_rays.eq(store.step_rays),
-            stack.push.eq(traversal.push),
-            stack.popped_address.eq(traversal.popped_address),
-            traversal.popped_intervals.eq(stack.popped_intervals),
-            intersection.hit_address.eq(stack.hit_address),
-            stack.hit_distances.eq(intersection.hit_distances),
-            intersection.entered.eq(transformation.entered),
-            intersection.record_address.eq(write_out.record_address),
-            write_out.record.eq(intersection.record),
-            rays.position_address.eq(write_out.position_address),
-            write_out.position.eq(rays.position),
-            mailboxed_list.begin.eq(rays.begin),
-            transformation.camera.eq(self.camera),
-            transformation.root.eq(self.root),
-            rays.width.eq(self.width),
-            rays.height.eq(self.height),
-            write_out.width.eq(self.width),
-            write_out.height.eq(self.height),
-            write_out.background.eq(self.background),
-        ]
-        wiring.connect(m, write_out.color_request, wiring.flipped(self.shading_request))
-        wiring.connect(m, wiring.flipped(self.shading_data), write_out.color_data)
-        wiring.connect(m, write_out.pixel, wiring.flipped(self.pixel))
+        config, pipelines = self.config, self._pipelines
+        m.submodules.ray_generation = rays = RayGeneration(
+            coord_width=config.coord_width, num_pipelines=config.num_pipelines)
+        m.d.comb += [rays.width.eq(self.width), rays.height.eq(self.height)]
+        for number, (pipeline, packet) in enumerate(zip(pipelines, rays.packet, strict=True)):
+            m.submodules[f"pipeline{number}"] = pipeline
+            wiring.connect(m, packet, pipeline.packet)
+            m.d.comb += [getattr(pipeline, name).eq(getattr(self, name))
+                         for name in ("camera", "root", "width", "height", "background")]
+            m.d.comb += [self.probe[number * len(UNITS) + unit].eq(pipeline.probe[unit]) for unit in range(len(UNITS))]
+        self._share_memories(m)
+        if len(pipelines) == 1:
+            pixels = pipelines[0].pixel
+        else:
+            m.submodules.pixels = merge = Merge(self.pixel.payload.shape(), num_inputs=len(pipelines))
+            for pipeline, target in zip(pipelines, merge.i, strict=True):
+                wiring.connect(m, pipeline.pixel, target)
+            pixels = merge.o
+        wiring.connect(m, pixels, wiring.flipped(self.pixel))
 
         # A picture begins with empty caches: the scene may be another.
         flushing = Signal()
-        idle = Signal()
         m.d.comb += [
-            idle.eq(rays.ready & write_out.idle),
-            self.ready.eq(idle & ~flushing),
-            rays.start.eq(flushing & nodes.flushed & caches["lists"].flushed & matrices.flushed),
+            self.ready.eq(rays.ready & Cat(pipeline.ready for pipeline in pipelines).all() & ~flushing),
+            rays.start.eq(flushing & Cat(pipeline.flushed for pipeline in pipelines).all()),
+            *(pipeline.flush.eq(flushing) for pipeline in pipelines),
         ]
-        m.d.comb += [cache.flush.eq(flushing) for cache in caches.values()]
         with m.If(self.start):
             m.d.sync += flushing.eq(1)
         with m.Elif(rays.start):
             m.d.sync += flushing.eq(0)
-
-        self._count(m, caches, {
-            "packets": rays.begin.valid,
-            "busy_traversal": traversal.busy,
-            "busy_list": mailboxed_list.busy,
-            "busy_transformation": transformation.busy,
-            "busy_intersection": intersection.busy,
-        })
-
-        def transfer(source, token):
-            return source.valid & source.ready, token.thread
-
-        lists = caches["lists"]
-        entering = (
-            (rays.begin.valid, rays.begin.thread),
-            transfer(nodes.request, nodes.request.payload.payload),
-            (traversal.node.valid, traversal.node.payload.payload.thread),
-            transfer(stack.pop, stack.pop.payload),
-            transfer(lists.request, lists.request.payload.payload.token),
-            transfer(mailboxed_list.entry, mailboxed_list.entry.payload.payload.token),
-            transfer(matrices.request, matrices.request.payload.payload.token),
-            transfer(transformation.matrix, transformation.matrix.payload.payload.token),
-            (intersection.vector.valid, intersection.vector.payload.token.thread),
-            transfer(write_out.packet, write_out.packet.payload),
-        )
-        for probe, (valid, thread) in zip(self.probe, entering, strict=True):
-            m.d.comb += [probe.valid.eq(valid), probe.thread.eq(thread)]
+        self._count(m)
         return m
 
-    def _count(self, m, caches, events):
-        m.submodules.counters = counters = Counters(COUNTERS)
-        events = {"cycles": ~self.ready, **events}
-        for name, cache in caches.items():
-            events |= {f"hit_{name}": cache.hit, f"miss_{name}": cache.miss}
-        m.d.comb += counters.clear.eq(self.start)
-        m.d.comb += [getattr(counters, f"event_{name}").eq(events[name]) for name in COUNTERS]
-        m.d.comb += [getattr(self.counters, name).eq(getattr(counters, name)) for name in COUNTERS]
+    def _share_memories(self, m):
+        for name, (words, line_width) in memory_ports(self.config).items():
+            ports = [(getattr(pipeline, f"{name}_request"), getattr(pipeline, f"{name}_data"))
+                     for pipeline in self._pipelines]
+            if len(ports) == 1:
+                request, words_back = ports[0]
+            else:
+                sharing = LineSharing(num_users=len(ports), num_fetches=self._num_fetches(name),
+                                      line_width=line_width, line_words=words)
+                m.submodules[f"{name}_sharing"] = sharing
+                for number, (request, words_back) in enumerate(ports):
+                    wiring.connect(m, request, sharing.request[number])
+                    wiring.connect(m, sharing.data[number], words_back)
+                request, words_back = sharing.line_request, sharing.line_data
+            wiring.connect(m, request, wiring.flipped(getattr(self, f"{name}_request")))
+            wiring.connect(m, wiring.flipped(getattr(self, f"{name}_data")), words_back)
+
+    def _num_fetches(self, name):
+        """Lines that a pipeline may have requested of a memory."""
+        if name == "shading" and self.config.program is None:
+            return WriteOut.num_requests
+        return self.config.num_fetches
+
+    def _count(self, m):
+        m.submodules.counters = counters = Counters(self._names, num_sources=len(self._pipelines))
+        m.d.comb += [counters.clear.eq(self.start), counters.event_cycles.eq(~self.ready)]
+        for name in self._names[1:]:
+            m.d.comb += getattr(counters, f"event_{name}").eq(
+                sum(pipeline.events[name] for pipeline in self._pipelines))
+        m.d.comb += [getattr(self.counters, name).eq(getattr(counters, name)) for name in self._names]

@@ -9,7 +9,7 @@ from fpu import Datapath, Delay
 from .arithmetic import ARITHMETICS
 from .layout import PACKET_RAYS, thread_width, token_layout, vector_layout, with_token
 
-__all__ = ["Intersection", "hit_layout", "unit_triangle"]
+__all__ = ["Intersection", "hit_layout", "limits_layout", "unit_triangle"]
 
 
 def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], limited=False):
@@ -48,10 +48,19 @@ def hit_layout(*, fmt, index_width):
     })
 
 
+def limits_layout(*, fmt, index_width):
+    """What a ray may hit: beyond ``t_near`` any but one triangle; for ``any_hit`` no more once it is a solid one.
+
+    ``instance`` is all ones for a triangle outside of all instances.
+    """
+    return data.StructLayout({"t_near": fmt, "triangle": index_width, "instance": index_width, "any_hit": 1})
+
+
 class Intersection(wiring.Component):
     """Tests a ray against the unit triangle each clock, and keeps each ray's closest hit.
 
-    A hit at the same distance as an earlier one does not replace it.
+    A hit at the same distance as an earlier one does not replace it. A ray for which any hit will do has its distance
+    set to 0 by a solid triangle, so that nothing is nearer from then on.
 
     Parameters
     ----------
@@ -63,11 +72,15 @@ class Intersection(wiring.Component):
         Of the operators, see :class:`~fpu.Datapath`.
     arithmetic : :class:`~rtl.arithmetic.Arithmetic`
         How it computes.
+    limited : bool
+        Whether rays have limits.
 
     Members
     -------
-    vector : stream of ``{"token", "index", "is_origin", "ray", "last", "vector"}``: rays in the triangle's
-        space, of each packet the origin first
+    vector : stream of ``{"token", "index", "is_origin", "ray", "first", "last", "solid", "vector"}``: rays in the
+        triangle's space, an origin before the directions that begin there
+    limit : stream of ``{"thread", "ray", "has_far", "t_far", "limits"}``: a ray that begins; if it has a ``t_far``, its
+        record is that of a hit there of triangle number all ones (if ``limited``)
     entered : ``{"valid", "thread", "index"}``: the packet's next hits belong to that instance
     tested : stream of tokens: a packet's rays are through, and its token knows which have a hit
     hit_address, hit_distances : a thread; two cycles later, t of each ray's hit
@@ -76,18 +89,23 @@ class Intersection(wiring.Component):
     """
 
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None,
-                 arithmetic=ARITHMETICS[0]):
+                 arithmetic=ARITHMETICS[0], limited=False):
         self._fmt = fmt
+        self._limited = limited
         self._latencies = latencies
         self._arithmetic = arithmetic
         self._num_threads = num_threads
         self._index_width = index_width
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         self._record = hit_layout(fmt=fmt, index_width=index_width)
+        self._limits = limits_layout(fmt=fmt, index_width=index_width)
+        begin = data.StructLayout({"thread": thread_width(num_threads), "ray": range(PACKET_RAYS), "has_far": 1,
+                                   "t_far": fmt, "limits": self._limits})
         super().__init__({
+            **({"limit": In(stream.Signature(begin))} if limited else {}),
             "vector": In(stream.Signature(with_token(
-                token, index=index_width, is_origin=1, ray=range(PACKET_RAYS), last=1,
-                vector=vector_layout(fmt)), always_ready=True)),
+                token, index=index_width, is_origin=1, ray=range(PACKET_RAYS), first=1, last=1,
+                solid=int(limited), vector=vector_layout(fmt)), always_ready=True)),
             "entered": In(data.StructLayout({"valid": 1, "thread": thread_width(num_threads), "index": index_width})),
             "tested": Out(stream.Signature(token, always_ready=True)),
             "hit_address": In(thread_width(num_threads)),
@@ -100,17 +118,15 @@ class Intersection(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         num_slots = 1 << thread_width(self._num_threads)
-        graph = unit_triangle(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic)
+        graph = unit_triangle(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic,
+                              limited=self._limited)
         m.submodules.test = test = graph.component()
 
         vector = self.vector.payload
         origin = Signal(vector_layout(self._fmt), reset_less=True)
-        after_origin = Signal(reset_less=True)
         taken = Signal()
-        with m.If(self.vector.valid):
-            m.d.sync += after_origin.eq(vector.is_origin)
-            with m.If(vector.is_origin):
-                m.d.sync += origin.eq(vector.vector)
+        with m.If(self.vector.valid & vector.is_origin):
+            m.d.sync += origin.eq(vector.vector)
         m.d.comb += [taken.eq(self.vector.valid & ~vector.is_origin), self.busy.eq(taken)]
         for axis in "xyz":
             m.d.comb += [
@@ -120,7 +136,8 @@ class Intersection(wiring.Component):
 
         # The distance to beat has its address two cycles before it is wanted.
         beside_layout = data.StructLayout({"token": self._token, "ray": range(PACKET_RAYS), "first": 1, "last": 1,
-                                           "index": self._index_width, "cosine": self._fmt})
+                                           "index": self._index_width, "cosine": self._fmt,
+                                           "solid": int(self._limited)})
         ask_at = graph.inputs["t_hit"].start - 2
         m.submodules.to_ask = to_ask = Delay(beside_layout, cycles=ask_at)
         m.submodules.to_end = to_end = Delay(beside_layout, cycles=graph.latency - ask_at)
@@ -128,10 +145,11 @@ class Intersection(wiring.Component):
         m.d.comb += [
             to_ask.i.token.eq(vector.token),
             to_ask.i.ray.eq(vector.ray),
-            to_ask.i.first.eq(after_origin),
+            to_ask.i.first.eq(vector.first),
             to_ask.i.last.eq(vector.last),
             to_ask.i.index.eq(vector.index),
             to_ask.i.cosine.eq(vector.vector.z),
+            to_ask.i.solid.eq(vector.solid),
             to_end.i.eq(to_ask.o),
             valid[0].eq(taken),
         ]
@@ -151,8 +169,9 @@ class Intersection(wiring.Component):
         now = Signal(PACKET_RAYS)
         hits_so_far = Signal(PACKET_RAYS, reset_less=True)
         better = Signal()
+        allowed, is_over = Signal(init=1), Signal()
         m.d.comb += [
-            better.eq(valid[-1] & test.hit & (test.nearer | ~done.token.hit.bit_select(done.ray, 1))),
+            better.eq(valid[-1] & test.hit & allowed & (test.nearer | ~done.token.hit.bit_select(done.ray, 1))),
             before.eq(Mux(done.first, done.token.hit, hits_so_far)),
             now.eq(before | (better << done.ray)),
             self.tested.payload.eq(done.token),
@@ -164,6 +183,11 @@ class Intersection(wiring.Component):
 
         m.submodules.instances = instances = memory.Memory(shape=self._index_width, depth=num_slots, init=[])
         entered_write, instance_read = instances.write_port(), instances.read_port(domain="comb")
+        # What is written to the distances: a hit's, or the one that a ray begins with.
+        new = Signal(data.StructLayout({"valid": 1, "thread": done.token.thread.shape(), "ray": range(PACKET_RAYS),
+                                        "t": self._fmt}))
+        m.d.comb += [new.valid.eq(better), new.thread.eq(done.token.thread), new.ray.eq(done.ray),
+                     new.t.eq(Mux(is_over, self._fmt.const(0.0), test.t))]
         m.submodules.records = records = memory.Memory(shape=self._record, depth=PACKET_RAYS * num_slots, init=[])
         record_read, record_write = records.read_port(), records.write_port()
         record = Signal(self._record, reset_less=True)
@@ -172,10 +196,10 @@ class Intersection(wiring.Component):
             entered_write.data.eq(self.entered.index),
             entered_write.en.eq(self.entered.valid),
             instance_read.addr.eq(done.token.thread),
-            distance_write.addr.eq(Cat(done.ray, done.token.thread)),
-            distance_write.data.eq(test.t),
-            distance_write.en.eq(better),
-            record_write.addr.eq(Cat(done.ray, done.token.thread)),
+            distance_write.addr.eq(Cat(new.ray, new.thread)),
+            distance_write.data.eq(new.t),
+            distance_write.en.eq(new.valid),
+            record_write.addr.eq(Cat(new.ray, new.thread)),
             record_write.data.t.eq(test.t),
             record_write.data.u.eq(test.u),
             record_write.data.v.eq(test.v),
@@ -183,7 +207,7 @@ class Intersection(wiring.Component):
             record_write.data.triangle.eq(done.index),
             record_write.data.instance.eq(instance_read.data),
             record_write.data.in_instance.eq(done.token.level),
-            record_write.en.eq(better),
+            record_write.en.eq(new.valid),
             record_read.addr.eq(self.record_address),
             self.record.eq(record),
         ]
@@ -195,11 +219,49 @@ class Intersection(wiring.Component):
             bank_read, bank_write = bank.read_port(), bank.write_port()
             bank_distance = Signal(self._fmt, name=f"distance{ray}", reset_less=True)
             m.d.comb += [
-                bank_write.addr.eq(done.token.thread),
-                bank_write.data.eq(test.t),
-                bank_write.en.eq(better & (done.ray == ray)),
+                bank_write.addr.eq(new.thread),
+                bank_write.data.eq(new.t),
+                bank_write.en.eq(new.valid & (new.ray == ray)),
                 bank_read.addr.eq(self.hit_address),
                 self.hit_distances[ray].eq(bank_distance),
             ]
             m.d.sync += bank_distance.eq(bank_read.data)
+        if self._limited:
+            with m.If(~better):
+                m.d.comb += [new.valid.eq(self.limit.valid & self.limit.payload.has_far),
+                             new.thread.eq(self.limit.payload.thread), new.ray.eq(self.limit.payload.ray),
+                             new.t.eq(self.limit.payload.t_far),
+                             record_write.data.triangle.eq(~0)]
+            m.d.comb += self.limit.ready.eq(~better)
+            self._limit(m, test, to_ask.o, to_end.o, cycles=graph.latency - ask_at, instances=instances,
+                        allowed=allowed, is_over=is_over)
         return m
+
+    def _limit(self, m, test, asking, done, *, cycles, instances, allowed, is_over):
+        """Looks up the limits of the ray ``asking``, ``cycles`` before it is ``done``."""
+        m.submodules.limits = limits = memory.Memory(
+            shape=self._limits, depth=PACKET_RAYS << thread_width(self._num_threads), init=[])
+        read, write = limits.read_port(), limits.write_port()
+        instance_read = instances.read_port(domain="comb")
+        limit = Signal(self._limits, reset_less=True)
+        m.submodules.asked = asked = Delay(
+            data.StructLayout({"triangle": self._index_width, "instance": self._index_width}), cycles=2)
+        begin = self.limit.payload
+        m.d.comb += [
+            read.addr.eq(Cat(asking.ray, asking.token.thread)),
+            write.addr.eq(Cat(begin.ray, begin.thread)),
+            write.data.eq(begin.limits),
+            write.en.eq(self.limit.valid),
+            instance_read.addr.eq(asking.token.thread),
+            asked.i.triangle.eq(asking.index),
+            asked.i.instance.eq(Mux(asking.token.level, instance_read.data, ~0)),
+            test.t_near.eq(limit.t_near),
+        ]
+        m.d.sync += limit.eq(read.data)
+        m.submodules.verdict = verdict = Delay(data.StructLayout({"excluded": 1, "any_hit": 1}), cycles=cycles - 2)
+        m.d.comb += [
+            verdict.i.excluded.eq((limit.triangle == asked.o.triangle) & (limit.instance == asked.o.instance)),
+            verdict.i.any_hit.eq(limit.any_hit),
+            allowed.eq(~verdict.o.excluded),
+            is_over.eq(verdict.o.any_hit & done.solid),
+        ]

@@ -10,9 +10,11 @@ __all__ = [
     "IntervalSource",
     "camera_layout",
     "interval_layout",
+    "job_layout",
     "list_entry_layout",
     "matrix_layout",
-    "node_layout", "thread_width",
+    "node_layout",
+    "thread_width",
     "token_layout",
     "vector_layout",
     "with_token",
@@ -75,6 +77,14 @@ def token_layout(*, num_threads, stack_depth):
 def with_token(token, **members):
     """A token and what travels with it."""
     return data.StructLayout({"token": token, **members})
+
+
+def job_layout(token, *, index_width, solid):
+    """A packet's rays to be transformed by the matrix ``index``, of an instance or a triangle.
+
+    ``solid``, if it is kept: the triangle lets no light through.
+    """
+    return with_token(token, index=index_width, instance=1, solid=int(solid))
 
 
 def node_layout(*, fmt, index_width):

@@ -4,7 +4,7 @@ from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from .layout import PACKET_RAYS, list_entry_layout, thread_width, token_layout, with_token
+from .layout import PACKET_RAYS, job_layout, list_entry_layout, thread_width, token_layout, with_token
 from .queue import Merge, Queue
 
 __all__ = ["MailboxedList"]
@@ -25,6 +25,8 @@ class MailboxedList(wiring.Component):
     ----------
     num_threads, stack_depth, index_width, mailbox_entries : int
         See :class:`~rtl.config.ChipConfig`.
+    solid : bool
+        Whether jobs tell of triangles that let no light through.
 
     Members
     -------
@@ -34,13 +36,14 @@ class MailboxedList(wiring.Component):
         Of such a token only thread, level and hits count
     fetch : stream of ``{"index", "payload"}``: to the list cache
     entry : stream of ``{"item", "payload"}``: from the list cache
-    job : stream of ``{"token", "index", "instance"}``: a matrix to transform the packet with; the token's mask
+    job : stream of :func:`~rtl.layout.job_layout`: a matrix to transform the packet with; the token's mask
         tells the rays
     pop : stream of tokens: the list is at its end
     busy : an entry is looked at
     """
 
-    def __init__(self, *, num_threads, stack_depth, index_width, mailbox_entries):
+    def __init__(self, *, num_threads, stack_depth, index_width, mailbox_entries, solid=False):
+        self._solid = solid
         self._num_threads = num_threads
         self._index_width = index_width
         self._mailbox_entries = mailbox_entries
@@ -53,7 +56,7 @@ class MailboxedList(wiring.Component):
             "left": In(stream.Signature(token)),
             "fetch": Out(stream.Signature(data.StructLayout({"index": index_width, "payload": self._place}))),
             "entry": In(stream.Signature(data.StructLayout({"item": 32, "payload": self._place}))),
-            "job": Out(stream.Signature(with_token(token, index=index_width, instance=1), always_ready=True)),
+            "job": Out(stream.Signature(job_layout(token, index_width=index_width, solid=solid), always_ready=True)),
             "pop": Out(stream.Signature(token, always_ready=True)),
             "busy": Out(1),
         })
@@ -175,6 +178,7 @@ class MailboxedList(wiring.Component):
             job.token.mask.eq(wanted),
             job.index.eq(entry.index),
             job.instance.eq(entry.instance),
+            job.solid.eq(entry.solid),
             job_valid.eq(looking & wanted.any()),
         ]
         m.d.comb += [self.job.payload.eq(job), self.job.valid.eq(job_valid)]

@@ -2,8 +2,8 @@
 
 Each ray has 32 registers of three lanes, a stack, and a program counter. A lane holds a float of the chip's format, or
 an integer: a number of a record or a triangle, bytes, or a colour of 8 integer and 16 fraction bits. An instruction
-reads ``a``, ``b``, ``c`` as they are, and of ``x`` the lanes that ``select`` names, floats negated where ``negate`` says
-so; it writes the lanes of ``mask`` of register ``dst``. A ray has one instruction under way at a time.
+reads ``a``, ``b``, ``c`` as they are, and of ``x`` the lanes that ``select`` names, floats negated where ``negate``
+says so; it writes the lanes of ``mask`` of register ``dst``. A ray has one instruction under way at a time.
 
 There are no other multipliers and adders for floats than those of the transformation unit (paper §2.2: rays are made
 by giving it a transformation and an initial ray).

@@ -1,13 +1,13 @@
-"""The ray generation controller: which packet a free thread takes next."""
+"""The ray generation controller: which packet is begun next, and by which pipeline."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal, signed
-from amaranth.lib import data, memory, stream, wiring
+from amaranth.hdl import Cat, Module, Signal
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from .layout import PACKET_RAYS, thread_width, token_layout, with_token
+from .layout import PACKET_RAYS
 from .queue import Queue
 
-__all__ = ["TILE_BITS", "RayGeneration", "packet_order"]
+__all__ = ["TILE_BITS", "RayGeneration", "packet_layout", "packet_order"]
 
 #: A tile is a square of 2**TILE_BITS packets a side.
 TILE_BITS = 3
@@ -28,98 +28,70 @@ def packet_order(width, height):
                     yield x, y
 
 
+def packet_layout(coord_width):
+    """A packet of a picture: pixel (x, y) of ray 0, and which rays are inside the picture."""
+    return data.StructLayout({"x": coord_width, "y": coord_width, "mask": PACKET_RAYS})
+
+
 class RayGeneration(wiring.Component):
-    """Hands the packets of a picture to threads, a new one to each that has finished.
+    """Hands the packets of a picture to the pipelines, each to the next that has room for one.
 
     Parameters
     ----------
-    num_threads, stack_depth, coord_width : int
+    coord_width : int
         See :class:`~rtl.config.ChipConfig`.
+    num_pipelines : int
+        Pipelines, each with room for two packets that it has not begun if there are several.
 
     Members
     -------
     width, height : size of the picture in pixels
     start : begin a picture; ``ready`` must be set
-    ready : no picture is at work
-    primary : stream of ``{"token", "x", "y"}``: a packet, see :class:`~rtl.transformation.Transformation`
-    begin : ``{"valid", "thread"}``: the thread begins a packet
-    finished : stream of tokens: the thread has nothing more to do
-    position_address, position : a thread; pixel ``{"x", "y"}`` of its ray 0, combinational
+    ready : all packets of the picture have been taken
+    packet : array of streams of :func:`packet_layout`, one for each pipeline
     """
 
-    def __init__(self, *, num_threads, stack_depth, coord_width):
-        self._num_threads = num_threads
-        self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
+    def __init__(self, *, coord_width, num_pipelines=1):
         self._coord_width = coord_width
-        self._position = data.StructLayout({"x": coord_width, "y": coord_width})
-        half = signed(coord_width + 2)
+        self._num_pipelines = num_pipelines
+        self._packet = packet_layout(coord_width)
         super().__init__({
             "width": In(coord_width),
             "height": In(coord_width),
             "start": In(1),
             "ready": Out(1),
-            "primary": Out(stream.Signature(with_token(token, x=half, y=half))),
-            "begin": Out(data.StructLayout({"valid": 1, "thread": thread_width(num_threads)})),
-            "finished": In(stream.Signature(token, always_ready=True)),
-            "position_address": In(thread_width(num_threads)),
-            "position": Out(self._position),
+            "packet": Out(stream.Signature(self._packet)).array(num_pipelines),
         })
 
     def elaborate(self, platform):
         m = Module()
-        threads = self._num_threads
-        m.submodules.free = free = Queue(thread_width(threads), depth=threads, always_ready=True)
-        m.submodules.positions = positions = memory.Memory(
-            shape=self._position, depth=1 << thread_width(threads), init=[])
-        write, read = positions.write_port(), positions.read_port(domain="comb")
-
-        # At first every thread is free without having finished anything.
-        unused = Signal(range(threads + 1), init=threads)
-        at_work = Signal(range(threads + 1))
-        thread = Signal(thread_width(threads))
-        available = Signal()
-        m.d.comb += [
-            free.i.payload.eq(self.finished.payload.thread),
-            free.i.valid.eq(self.finished.valid),
-            thread.eq(Mux(unused.any(), unused - 1, free.o.payload)),
-            available.eq(unused.any() | free.o.valid),
-        ]
-
         side = 2 << TILE_BITS
         tile_x, tile_y = Signal(self._coord_width + 1), Signal(self._coord_width + 1)
         number = Signal(2 * TILE_BITS)
         x, y = Signal(self._coord_width + 1), Signal(self._coord_width + 1)
         drawing = Signal()
         inside = Signal()
-        issued = Signal()
         advance = Signal()
+        packet = Signal(self._packet)
+        offered, issued, all_taken = Signal(), Signal(), Signal(init=1)
         m.d.comb += [
             x.eq(tile_x + Cat(0, number[0::2])),
             y.eq(tile_y + Cat(0, number[1::2])),
             inside.eq((x < self.width) & (y < self.height)),
-            self.primary.valid.eq(drawing & inside & available),
-            issued.eq(self.primary.valid & self.primary.ready),
+            offered.eq(drawing & inside),
             advance.eq(issued | drawing & ~inside),
-            free.o.ready.eq(issued & ~unused.any()),
-            self.primary.payload.token.thread.eq(thread),
-            self.primary.payload.x.eq(2 * x + 1 - self.width),
-            self.primary.payload.y.eq(self.height - 1 - 2 * y),
-            self.begin.valid.eq(issued),
-            self.begin.thread.eq(thread),
-            write.addr.eq(thread),
-            write.data.x.eq(x),
-            write.data.y.eq(y),
-            write.en.eq(issued),
-            read.addr.eq(self.position_address),
-            self.position.eq(read.data),
-            self.ready.eq(~drawing & ~at_work.any()),
+            packet.x.eq(x),
+            packet.y.eq(y),
+            self.ready.eq(~drawing & all_taken),
         ]
         for ray in range(PACKET_RAYS):
-            m.d.comb += self.primary.payload.token.mask[ray].eq(
-                (x + (ray & 1) < self.width) & (y + (ray >> 1) < self.height))
-        m.d.sync += at_work.eq(at_work + issued - self.finished.valid)
-        with m.If(issued & unused.any()):
-            m.d.sync += unused.eq(unused - 1)
+            m.d.comb += packet.mask[ray].eq((x + (ray & 1) < self.width) & (y + (ray >> 1) < self.height))
+        if self._num_pipelines == 1:
+            target, = self.packet
+            m.d.comb += [target.valid.eq(offered), target.payload.eq(packet), issued.eq(offered & target.ready)]
+        else:
+            self._distribute(m, packet, offered, issued, all_taken)
+
         with m.If(self.start):
             m.d.sync += [drawing.eq(1), tile_x.eq(0), tile_y.eq(0), number.eq(0)]
         with m.Elif(advance):
@@ -131,3 +103,24 @@ class RayGeneration(wiring.Component):
                     with m.If(tile_y + side >= self.height):
                         m.d.sync += drawing.eq(0)
         return m
+
+    def _distribute(self, m, packet, offered, issued, all_taken):
+        """To the pipeline whose turn it is, or the next one that has room."""
+        queues = [Queue(self._packet, depth=2) for _ in range(self._num_pipelines)]
+        turn = Signal(range(self._num_pipelines))
+        m.d.comb += all_taken.eq(~Cat(queue.o.valid for queue in queues).any())
+        for number, (queue, target) in enumerate(zip(queues, self.packet, strict=True)):
+            m.submodules[f"queue{number}"] = queue
+            wiring.connect(m, queue.o, wiring.flipped(target))
+            m.d.comb += queue.i.payload.eq(packet)
+        with m.Switch(turn):
+            for first in range(self._num_pipelines):
+                with m.Case(first):
+                    # The last assignment wins, so the pipeline whose turn it is comes last.
+                    for offset in reversed(range(self._num_pipelines)):
+                        number = (first + offset) % self._num_pipelines
+                        with m.If(queues[number].i.ready):
+                            m.d.comb += [[queue.i.valid.eq(0) for queue in queues],
+                                         queues[number].i.valid.eq(offered), issued.eq(offered)]
+                            with m.If(offered):
+                                m.d.sync += turn.eq((number + 1) % self._num_pipelines)

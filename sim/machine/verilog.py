@@ -10,6 +10,7 @@ from amaranth.lib import wiring
 __all__ = ["component_verilog"]
 
 _INITIAL = re.compile(r"^  initial begin\n.*?^  end\n", re.MULTILINE | re.DOTALL)
+_CONSTANT = re.compile(r"^  always @\*\n(?=    \S+ = \d+'h[0-9a-f]+;\n)", re.MULTILINE)
 _ZERO = re.compile(r"^ +\S+ ?\[\d+\] = \d+'h0+;\n", re.MULTILINE)
 
 
@@ -27,5 +28,7 @@ def component_verilog(component, *, name):
             direction = PortDirection.Input if member.flow == wiring.In else PortDirection.Output
             ports["_".join(map(str, path))] = (value, direction)
     text = verilog.convert(component, name=name, ports=ports, emit_src=False, strip_internal_attrs=True)
+    # What has nothing to wait for is never executed: constant fields of signals that are assigned piece by piece.
+    text = _CONSTANT.sub("  initial\n", text)
     # A simulator's memories are zero anyhow, and a line for each word is most of what would have to be compiled.
     return _INITIAL.sub(lambda block: _ZERO.sub("", block[0]), text)

@@ -70,8 +70,8 @@ class World:
         rays = rays_of(token["mask"])
         for ray in rays:
             direction = self.hit_on_edge(origin) if rng.random() < 0.75 else [self.scalar() for _ in range(3)]
-            self.vectors.append(packet | {"is_origin": 0, "ray": ray, "last": ray == rays[-1],
-                                          "vector": self.vector(direction)})
+            self.vectors.append(packet | {"is_origin": 0, "ray": ray, "first": ray == rays[0],
+                                          "last": ray == rays[-1], "vector": self.vector(direction)})
             t, u, v, is_hit = reference_test(self.arithmetic, origin, direction)
             if not is_hit:
                 self.events["miss"] += 1
@@ -180,8 +180,8 @@ def test_latencies_of_operators(latencies):
 def test_edges_and_limits(origin, direction, is_hit):
     dut = Intersection(fmt=FMT, num_threads=1, stack_depth=1, index_width=8, latencies=LATENCIES)
     token = {"thread": 0, "hit": 0, "mask": 1}
-    vectors = deque({"token": token, "is_origin": is_origin, "last": 1 - is_origin, "vector": World.vector(vector)}
-                    for is_origin, vector in ((1, origin), (0, direction)))
+    vectors = deque({"token": token, "is_origin": is_origin, "first": 1 - is_origin, "last": 1 - is_origin,
+                     "vector": World.vector(vector)} for is_origin, vector in ((1, origin), (0, direction)))
     tested = []
     simulate(dut, until(lambda: tested), background=(
         feed(dut.vector, vectors, rng=random.Random(0)), drain(dut.tested, tested.append)), ticks=100, name="edges")

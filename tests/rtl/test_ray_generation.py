@@ -4,8 +4,11 @@ import random
 from collections import deque
 
 import pytest
+from amaranth.hdl import Module
+from amaranth.lib import wiring
 
 from rtl.ray_generation import RayGeneration, packet_order
+from rtl.threads import Threads
 from tests.bench import drain, feed, simulate, watch
 from tests.rtl.packets import random_token
 
@@ -21,6 +24,29 @@ def reference_order(width, height):
     return sorted(((x, y) for y in range(0, height, 2) for x in range(0, width, 2)), key=place)
 
 
+class Controller(wiring.Component):
+    """Ray generation and the threads of one pipeline."""
+
+    def __init__(self, *, num_threads, stack_depth, coord_width):
+        self.rays = RayGeneration(coord_width=coord_width)
+        self.threads = Threads(num_threads=num_threads, stack_depth=stack_depth, coord_width=coord_width)
+        members = {name: member for name, member in self.threads.signature.members.items() if name != "packet"}
+        super().__init__({**members, "start": self.rays.signature.members["start"]})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.rays, m.submodules.threads = rays, threads = self.rays, self.threads
+        wiring.connect(m, rays.packet[0], threads.packet)
+        wiring.connect(m, threads.primary, wiring.flipped(self.primary))
+        wiring.connect(m, wiring.flipped(self.finished), threads.finished)
+        m.d.comb += [self.begin.eq(threads.begin), threads.position_address.eq(self.position_address),
+                     self.position.eq(threads.position), rays.start.eq(self.start),
+                     self.ready.eq(rays.ready & threads.ready)]
+        for unit in (rays, threads):
+            m.d.comb += [unit.width.eq(self.width), unit.height.eq(self.height)]
+        return m
+
+
 @pytest.mark.parametrize("size", [(1, 1), (2, 2), (16, 16), (17, 15), (37, 50)])
 def test_packet_order(size):
     assert list(packet_order(*size)) == reference_order(*size)
@@ -31,7 +57,7 @@ def test_packet_order(size):
     (3, 64, [(20, 5), (20, 5)], 0.2)])
 def test_pictures(seed, num_threads, sizes, gap):
     rng = random.Random(seed)
-    dut = RayGeneration(num_threads=num_threads, stack_depth=2, coord_width=COORD_WIDTH)
+    dut = Controller(num_threads=num_threads, stack_depth=2, coord_width=COORD_WIDTH)
     at_work, waiting, finished = {}, [], deque()
     expected, started = deque(), deque()
 

@@ -1,0 +1,163 @@
+"""Where a ray goes on in its program, its stack, and its last hit."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal
+from amaranth.lib import data, memory, wiring
+from amaranth.lib.wiring import In, Out
+from amaranth.utils import ceil_log2
+
+from .instruction_fetch import ray_token_layout
+from .intersection import hit_layout
+from .layout import PACKET_RAYS, thread_width
+from .microcode import NO_TRIANGLE, Condition, Op, instruction_layout, lane_width
+from .register_file import lanes_layout
+
+__all__ = ["CONTROL_OPS", "ControlUnit", "result_layout"]
+
+#: Operations of this unit.
+CONTROL_OPS = frozenset({Op.MOVE, Op.BRANCH, Op.CALL, Op.RETURN, Op.HIT, Op.PUSH, Op.POP})
+
+
+def result_layout(ray_token, lanes):
+    """Lanes ``mask`` of register ``dst`` of a ray, with the last of which it is ready again."""
+    return data.StructLayout({"token": ray_token, "last": 1, "dst": 5, "mask": 3, "value": lanes})
+
+
+class ControlUnit(wiring.Component):
+    """Executes :data:`CONTROL_OPS`, one a clock, in two cycles; and says what follows any instruction.
+
+    Parameters
+    ----------
+    fmt, num_threads, program, stack_depth
+        See :class:`~rtl.instruction_fetch.InstructionFetch`.
+    index_width : int
+        Bits of a triangle's number.
+
+    Members
+    -------
+    i : ``{"valid", "token", "instruction", "a", "x"}``
+    following : the token as it is after the instruction
+    record_address, record : to and from the :class:`~rtl.intersection.Intersection`
+    o : ``{"valid", "result"}``, see :func:`result_layout`
+    """
+
+    latency = 2
+
+    def __init__(self, *, fmt, num_threads, program, stack_depth, index_width):
+        self._fmt = fmt
+        self._stack_depth = stack_depth
+        self._num_rays = PACKET_RAYS << thread_width(num_threads)
+        self._conditions = {line["condition"] for line in program.instructions if line["op"] is Op.BRANCH}
+        self._ops = {line["op"] for line in program.instructions}
+        self._lanes = lanes = lanes_layout(fmt)
+        self._token = token = ray_token_layout(num_threads=num_threads, program=program, stack_depth=stack_depth)
+        self._result = result_layout(token, lanes)
+        super().__init__({
+            "i": In(data.StructLayout({"valid": 1, "token": token, "a": lanes, "x": lanes,
+                                       "instruction": instruction_layout(len(program.instructions))})),
+            "following": Out(token),
+            "record_address": Out(data.StructLayout({"ray": range(PACKET_RAYS), "thread": thread_width(num_threads)})),
+            "record": In(hit_layout(fmt=fmt, index_width=index_width)),
+            "o": Out(data.StructLayout({"valid": 1, "result": self._result})),
+        })
+
+    def elaborate(self, platform):
+        m = Module()
+        op, token = self.i.instruction.op, self.i.token
+        jumps = Signal()
+        next_counter = Signal.like(token.counter)
+        m.d.comb += [
+            jumps.eq((op == Op.CALL) | (op == Op.BRANCH) & self._holds(m)),
+            next_counter.eq(token.counter + 1),
+            self.following.eq(token),
+            self.following.counter.eq(Mux(jumps, self.i.instruction.target, next_counter)),
+            self.record_address.ray.eq(token.ray),
+            self.record_address.thread.eq(token.thread),
+        ]
+        with m.Switch(op):
+            with m.Case(Op.RETURN):
+                m.d.comb += self.following.counter.eq(self.i.x[0])
+            with m.Case(Op.PUSH):
+                m.d.comb += self.following.sp.eq(token.sp + 1)
+            with m.Case(Op.POP):
+                m.d.comb += self.following.sp.eq(token.sp - 1)
+
+        stages = [Signal(data.StructLayout({"valid": 1, "op": Op, "part": 1, "result": self._result}),
+                         name=f"stage{stage}", reset_less=stage > 0) for stage in range(self.latency + 1)]
+        first, last = stages[0], stages[-1]
+        m.d.comb += [
+            first.valid.eq(self.i.valid),
+            first.op.eq(op),
+            first.part.eq(self.i.instruction.bit),
+            first.result.token.eq(self.following),
+            first.result.last.eq(1),
+            first.result.dst.eq(self.i.instruction.dst),
+            first.result.value.eq(self.i.x),
+            self.o.valid.eq(last.valid),
+            self.o.result.eq(last.result),
+        ]
+        with m.If((op != Op.BRANCH) & (op != Op.RETURN) & (op != Op.PUSH)):
+            m.d.comb += first.result.mask.eq(self.i.instruction.mask)
+        if Op.CALL in self._ops:
+            with m.If(op == Op.CALL):
+                m.d.comb += first.result.value.eq(Cat(Cat(next_counter, Const(0, lane_width(self._fmt)))
+                                                      [:lane_width(self._fmt)] for _ in range(3)))
+        for stage in range(self.latency):
+            m.d.sync += stages[stage + 1].eq(stages[stage])
+        if Op.HIT in self._ops:
+            with m.If(last.op == Op.HIT):
+                m.d.comb += self.o.result.value.eq(self._hit(last))
+        if Op.POP in self._ops:
+            self._stack(m, op, token, last)
+        return m
+
+    def _holds(self, m):
+        """Whether a branch's condition holds."""
+        instruction = self.i.instruction
+        raw = self.i.x[0]
+        x = self._fmt(raw[:self._fmt.width])
+        zero, less, miss = Signal(), Signal(), Signal()
+        bit = Signal()
+        m.d.comb += [zero.eq(x.exp == 0), bit.eq(raw.bit_select(instruction.bit, 1)), miss.eq(raw == NO_TRIANGLE),
+                     less.eq(raw < self.i.a.as_value().word_select(instruction.select[1].as_value()[:2],
+                                                                   lane_width(self._fmt)))]
+        negative = x.sign & ~zero
+        none = ~raw.any()
+        values = {
+            Condition.ALWAYS: 1, Condition.NEGATIVE: negative, Condition.NOT_NEGATIVE: ~negative,
+            Condition.ZERO: zero, Condition.NOT_ZERO: ~zero, Condition.NONE: none, Condition.SOME: ~none,
+            Condition.LESS: less, Condition.NOT_LESS: ~less, Condition.SET: bit, Condition.CLEAR: ~bit,
+            Condition.MISS: miss, Condition.EMPTY: self.i.token.sp == 0}
+        holds = Signal()
+        with m.Switch(instruction.condition):
+            for condition in sorted(self._conditions, key=lambda condition: condition.value):
+                with m.Case(condition):
+                    m.d.comb += holds.eq(values[condition])
+        return holds
+
+    def _hit(self, last):
+        """The two parts of a record; a ray without one has hit no triangle."""
+        width, record = lane_width(self._fmt), self.record
+
+        def lanes(*values):
+            return Cat(Cat(value, Const(0, width))[:width] for value in values)
+
+        is_none = ~last.result.token.hit | record.triangle.all()
+        where = lanes(record.t, record.u, record.v)
+        what = lanes(Mux(is_none, NO_TRIANGLE, record.triangle), Mux(record.in_instance, record.instance, NO_TRIANGLE),
+                     record.cosine)
+        return Mux(last.part, what, where)
+
+    def _stack(self, m, op, token, last):
+        entry_bits = max(ceil_log2(self._stack_depth), 1)
+        m.submodules.stack = stack = memory.Memory(shape=self._lanes, depth=self._num_rays << entry_bits, init=[])
+        read, write = stack.read_port(), stack.write_port()
+        popped = Signal(self._lanes, reset_less=True)
+        m.d.comb += [
+            write.addr.eq(Cat(token.sp[:entry_bits], token.ray, token.thread)),
+            write.data.eq(self.i.a),
+            write.en.eq(self.i.valid & (op == Op.PUSH)),
+            read.addr.eq(Cat((token.sp - 1)[:entry_bits], token.ray, token.thread)),
+        ]
+        m.d.sync += popped.eq(read.data)
+        with m.If(last.op == Op.POP):
+            m.d.comb += self.o.result.value.eq(popped)
