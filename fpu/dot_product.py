@@ -129,7 +129,7 @@ class DotProduct(Operator):
         levels = range((window + 1).bit_length())
         return {
             **product_delays("multiply", fmt.sig_width, fmt.sig_width),
-            "pairs": carry_delay(fmt.exp_width + 1) + lut_delay(1),
+            "mask": lut_delay(1), "pairs": carry_delay(fmt.exp_width + 1) + lut_delay(1),
             "highest": carry_delay(fmt.exp_width + 1) + lut_delay(1),
             "distance": carry_delay(fmt.exp_width + 1) + lut_delay(2),
             **{f"align_{level}": lut_delay(1.3) for level in levels[::-1]},
@@ -142,25 +142,30 @@ class DotProduct(Operator):
     def _compute(self, m, step):
         fmt = self.fmt
         terms = [(a.sign ^ b.sign, is_zero(a) | is_zero(b), is_inf(a) | is_inf(b)) for a, b in self._factors()]
-        # Exponents of products, with twice the bias; that of a zero must not be the highest.
-        exps = []
-        for index, (a, b) in enumerate(self._factors()):
-            exp = carry_chain(m, f"exponent_{index}", (
-                ChainBit.ADD, Cat(a.exp, Const(0, 1)), Cat(b.exp, Const(0, 1)), 0))
-            exps.append(Mux(terms[index][1], 0, exp))
+        # Exponents of products, with twice the bias
+        exps = [carry_chain(m, f"exponent_{index}", (
+            ChainBit.ADD, Cat(a.exp, Const(0, 1)), Cat(b.exp, Const(0, 1)), 0))
+            for index, (a, b) in enumerate(self._factors())]
         if self.has_addend:
             terms.append((self.c.sign, is_zero(self.c), is_inf(self.c)))
-            exps.append(Mux(is_zero(self.c), 0, Cat(self.c.exp, Const(0, 1)) + fmt.bias)[:fmt.exp_width + 1])
+            exps.append((Cat(self.c.exp, Const(0, 1)) + fmt.bias)[:fmt.exp_width + 1])
         live = range(len(terms))
         s = multiply_exactly(
             m, step, "multiply", *((Cat(a.frac, Const(1, 1)), Cat(b.frac, Const(1, 1))) for a, b in self._factors()),
-            plus_inf=Cat(inf & ~zero & ~sign for sign, zero, inf in terms),
-            minus_inf=Cat(inf & ~zero & sign for sign, zero, inf in terms),
             **({"addend": self.c.frac} if self.has_addend else {}),
             **{f"exp{index}": exps[index] for index in live},
-            **{f"sign{index}": terms[index][0] for index in live},
-            **{f"zero{index}": terms[index][1] for index in live})
-        significands = list(s.products)
+            **{f"{name}{index}": terms[index][place]
+               for place, name in enumerate(("sign", "zero", "inf")) for index in live})
+        # The exponent of a zero must not be the highest.
+        specials = [(getattr(s, f"inf{index}") & ~getattr(s, f"zero{index}"), getattr(s, f"sign{index}"))
+                    for index in live]
+        products = {f"product{index}": product for index, product in enumerate(s.products)}
+        kept = ["addend"] * self.has_addend + [f"{name}{index}" for name in ("sign", "zero") for index in live]
+        s = step("mask", plus_inf=Cat(inf & ~sign for inf, sign in specials),
+                 minus_inf=Cat(inf & sign for inf, sign in specials),
+                 **{f"exp{index}": Mux(getattr(s, f"zero{index}"), 0, getattr(s, f"exp{index}")) for index in live},
+                 **products, **{name: getattr(s, name) for name in kept})
+        significands = [getattr(s, name) for name in products]
         if self.has_addend:
             significands.append(Cat(Const(0, fmt.frac_width), s.addend, Const(1, 2))[:2 * fmt.sig_width])
         plus_inf, minus_inf = s.plus_inf.any(), s.minus_inf.any()
