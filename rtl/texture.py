@@ -29,7 +29,7 @@ class _Blend(wiring.Component):
     -------
     texel : red, green, blue, opacity, a byte each
     first : the texel is the first of its sum
-    corner, f, g : it is right of the place by bit 0 of ``corner``, below it by bit 1; weights in 1/256 of those that are
+    corner, f, g : it is on the right by bit 0 of ``corner``, below by bit 1; weights of those that are, in 1/256
     sums : of the four channels, in 2^-32, half a unit of 2^-16 more; ``latency`` cycles after the last texel
     """
 
