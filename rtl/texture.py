@@ -19,7 +19,8 @@ __all__ = ["Texture"]
 
 _FACTOR_WIDTH = COLOR_ONE.bit_length()
 _BASE_WIDTH = 24
-_LOOKUPS_DEPTH = 8
+# As many as the smallest memory of tables holds, and more than are under way when all are answered at once.
+_NUM_LOOKUPS = 16
 
 
 class _Blend(wiring.Component):
@@ -171,19 +172,22 @@ class Texture(wiring.Component):
         with m.If(takes):
             m.d.sync += is_second.eq(~is_second)
 
-        # One cycle for each corner, while all lookups that the cache has not taken have room to wait.
+        # One cycle for each corner, while the lookups without an answer have room to wait before the cache, and in it.
         ticket = data.StructLayout({"corner": 2, "slot": slot_width, "filtered": 1})
         m.submodules.lookups = lookups = Queue(
-            data.StructLayout({"index": self._index_width, "payload": ticket}), depth=_LOOKUPS_DEPTH, always_ready=True)
+            data.StructLayout({"index": self._index_width, "payload": ticket}), depth=_NUM_LOOKUPS, always_ready=True)
+        m.submodules.cache = cache = Cache(
+            item_width=WORD_WIDTH, payload_shape=ticket, index_width=self._index_width, num_waiting=_NUM_LOOKUPS,
+            **self._cache)
         m.submodules.address = address = TexelAddress(index_width=self._index_width)
         m.submodules.tickets = tickets = Delay(ticket, cycles=address.latency)
-        waiting = Signal(range(_LOOKUPS_DEPTH + 1))
+        unanswered = Signal(range(_NUM_LOOKUPS + 1))
         corner, slot = Signal(2), Signal(slot_width)
         looks_up, is_last_corner = Signal(), Signal()
         is_found = Signal(address.latency)
         texture = textures.o.payload
         m.d.comb += [
-            looks_up.eq(places.o.valid & (waiting < _LOOKUPS_DEPTH)),
+            looks_up.eq(places.o.valid & (unanswered < _NUM_LOOKUPS)),
             is_last_corner.eq(~texture.filtered | corner.all()),
             places.o.ready.eq(looks_up & is_last_corner),
             textures.o.ready.eq(looks_up & is_last_corner),
@@ -203,15 +207,12 @@ class Texture(wiring.Component):
         for weight, along in ((weights.i.payload.f, places.o.payload.x), (weights.i.payload.g, places.o.payload.y)):
             m.d.comb += weight.eq(Mux(texture.filtered, along[:WEIGHT_BITS] ^ 1 << WEIGHT_BITS - 1, 0))
         m.d.sync += [
-            waiting.eq(waiting + looks_up - (lookups.o.valid & lookups.o.ready)),
+            unanswered.eq(unanswered + looks_up - cache.response.valid),
             is_found.eq(Cat(looks_up, is_found)),
         ]
         with m.If(looks_up):
             m.d.sync += [corner.eq(Mux(is_last_corner, 0, corner + 1)), slot.eq(slot + is_last_corner)]
 
-        m.submodules.cache = cache = Cache(
-            item_width=WORD_WIDTH, payload_shape=ticket, index_width=self._index_width, num_waiting=4 * depth,
-            **self._cache)
         wiring.connect(m, lookups.o, cache.request)
         wiring.connect(m, cache.line_request, wiring.flipped(self.line_request))
         wiring.connect(m, wiring.flipped(self.line_data), cache.line_data)
