@@ -91,7 +91,7 @@ def test_lookups(seed, fmt, num_slots, line_items, num_lines, num_fetches, gap, 
     stored = Stored(SIZES, fmt=fmt, rng=rng)
     dut = Texture(fmt=fmt, payload_shape=9, num_slots=num_slots, num_lines=num_lines, line_items=line_items,
                   num_fetches=num_fetches, index_width=11)
-    given = stored.requests(rng, 500, SIZES)
+    given = stored.requests(rng, 250, SIZES)
     check(dut, stored.words, given, line_items=line_items, rng=rng, gap=gap, latency=latency)
 
 
