@@ -26,7 +26,8 @@ _FACTOR_WIDTH = COLOR_ONE.bit_length()
 
 def byte_fraction(byte):
     """Colour nearest to byte/255."""
-    return byte * 257 + (byte >> 7)
+    # Not times 257: synthesis would take a multiplier block.
+    return (byte << 8 | byte) + (byte >> 7)
 
 
 class ColorUnit(wiring.Component):

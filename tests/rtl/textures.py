@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from . import colors
 
-__all__ = ["address", "interesting_coordinates", "look_up", "packed_words"]
+__all__ = ["address", "interesting_coordinates", "look_up", "packed_words", "place"]
 
 _LINEAR = [colors.linear_color(byte) for byte in range(256)]
 _FRACTION = [colors.byte_fraction(byte) for byte in range(256)]
@@ -37,6 +37,11 @@ def _within_one(coordinate, folded):
     if folded:
         return min(max(math.floor(exact / ulp) * ulp, Fraction(0)), 1 - ulp)
     return math.floor((exact - math.floor(exact)) / ulp) * ulp
+
+
+def place(coordinate, side, folded):
+    """Where it is, in 1/256 of a texel."""
+    return math.floor(256 * side * _within_one(coordinate, folded))
 
 
 def _texel(pixels, column, row, folded):
