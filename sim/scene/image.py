@@ -8,7 +8,7 @@ memory    words  item
 nodes     2      bits 0–23 child, 24–25 axis (3: leaf), 26 lower child is empty, 27 upper child is empty; 32–… split
                  position as a float. Inner node: children are ``child`` (even) and ``child`` + 1. Leaf: ``child`` is
                  the first list entry. Nodes 0…n − 1 are where the n instances begin, each a copy of its mesh's root.
-lists     1      bits 0–23 matrix number, 30 it is an instance, 31 last of its leaf
+lists     1      bits 0–23 matrix number, 29 no light gets through, 30 it is an instance, 31 last of its leaf
 matrices  ⌈12·w  rows 0, 1, 2 of m (x, y, z each), then C: twelve floats of w bits, packed without gaps. Matrices
           ÷ 32⌉  0…n − 1 are those of the n instances, the others those of triangles.
 shading   1      of the triangle with that matrix number: bits 0–7 blue, 8–15 green, 16–23 red
@@ -23,12 +23,13 @@ import numpy as np
 from fpu import FloatFormat
 
 from .kdtree import LEAF
+from .triangles import unpack_fields
 
 __all__ = ["SceneImage", "describe"]
 
 AXIS_SHIFT, LOWER_EMPTY, UPPER_EMPTY = 24, 1 << 26, 1 << 27
 INDEX_MASK = (1 << 24) - 1
-INSTANCE_ENTRY, LAST_ENTRY = 1 << 30, 1 << 31
+SOLID_ENTRY, INSTANCE_ENTRY, LAST_ENTRY = 1 << 29, 1 << 30, 1 << 31
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +98,7 @@ class SceneImage:
 
     def matrix_values(self):
         """float64[M, 4, 3]: the three rows and C of each matrix."""
-        width = self.fmt.width
-        values = np.empty((len(self.matrices), 12))
-        words = np.concatenate([self.matrices, np.zeros((len(self.matrices), 1), np.uint32)], axis=1).astype(np.uint64)
-        for k in range(12):
-            word, shift = divmod(k * width, 32)
-            pair = words[:, word] | words[:, word + 1] << np.uint64(32)
-            values[:, k] = self.fmt.decode(pair >> np.uint64(shift) & np.uint64((1 << width) - 1))
-        return values.reshape(-1, 4, 3)
+        return self.fmt.decode(unpack_fields(self.matrices, self.fmt.width)).reshape(-1, 4, 3)
 
     def split_values(self):
         """float64[N]: the split position of each node."""
