@@ -12,6 +12,9 @@ lists     1      bits 0–23 matrix number, 29 no light gets through, 30 it is a
 matrices  ⌈12·w  rows 0, 1, 2 of m (x, y, z each), then C: twelve floats of w bits, packed without gaps. Matrices
           ÷ 32⌉  0…n − 1 are those of the n instances, the others those of triangles.
 shading   1      of the triangle with that matrix number: bits 0–7 blue, 8–15 green, 16–23 red
+records   ⌈12·w  of full shading, instead: twelve lanes of w = max(bits of a float, 24) bits, packed likewise; see
+          ÷ 32⌉  rtl/program/records.py
+texels    1      of full shading: see :mod:`sim.scene.texels`
 ========  =====  =================================================================================================
 """
 
@@ -21,6 +24,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fpu import FloatFormat
+from rtl.microcode import lane_width
+from rtl.program.features import ShaderFeatures
 
 from .kdtree import LEAF
 from .triangles import unpack_fields
@@ -60,6 +65,11 @@ class SceneImage:
         The chip's scene coordinates are (world − center) · scale.
     stats : dict
         Counts for reports.
+    records : uint32[R, W], optional
+    texels : uint32[K], optional
+        The memories of full shading.
+    needs : ShaderFeatures, optional
+        The least that draws all that is in the scene.
     """
 
     fmt: FloatFormat
@@ -76,17 +86,24 @@ class SceneImage:
     center: np.ndarray
     scale: float
     stats: dict = field(default_factory=dict)
+    records: np.ndarray | None = None
+    texels: np.ndarray | None = None
+    needs: ShaderFeatures | None = None
+
+    def _memories(self):
+        full = () if self.records is None else (self.records, self.texels)
+        return self.nodes, self.lists, self.matrices, *(full or (self.shading,))
 
     @property
     def num_bytes(self):
         """Size of all memories together."""
-        return sum(memory.nbytes for memory in (self.nodes, self.lists, self.matrices, self.shading))
+        return sum(memory.nbytes for memory in self._memories())
 
     @property
     def checksum(self):
         """CRC-32 of all memories."""
         crc = 0
-        for memory in (self.nodes, self.lists, self.matrices, self.shading):
+        for memory in self._memories():
             crc = zlib.crc32(memory.astype("<u4").tobytes(), crc)
         return crc
 
@@ -99,6 +116,11 @@ class SceneImage:
     def matrix_values(self):
         """float64[M, 4, 3]: the three rows and C of each matrix."""
         return self.fmt.decode(unpack_fields(self.matrices, self.fmt.width)).reshape(-1, 4, 3)
+
+    def record_lanes(self):
+        """Lanes of the records: as floats float64[R, 12], and as integers int64[R, 12]."""
+        fields = unpack_fields(self.records, lane_width(self.fmt))
+        return self.fmt.decode(fields & (1 << self.fmt.width) - 1), fields
 
     def split_values(self):
         """float64[N]: the split position of each node."""
