@@ -11,12 +11,15 @@ MAX_LAYERS = 64
 _ANY_HIT, _HAS_LIMIT = 1, 2
 
 #: Registers that lie on the stack meanwhile.
-SAVED = (Reg.HIT, Reg.OWNER, Reg.TRIANGLE, *range(Reg.MATERIAL, Reg.MATERIAL + 4), Reg.COLOR, Reg.OPACITY)
+SAVED = (Reg.HIT, Reg.TRIANGLE, *range(Reg.MATERIAL, Reg.MATERIAL + 4), Reg.COLOR, Reg.OPACITY)
 
 
 def write_layers(w):
     """VISIBLE: what the layers from the present hit on leave of a light; goes on at the next light if it is nothing."""
     left = Reg.LIGHT + 3
+    # What the light falls on, which it does not meet. Strictly onwards from a layer, that is not met again either.
+    lit = Reg.LIGHT
+    w.move(lit, Reg.OWNER)
     w.push(*SAVED)
     w.move(Reg.VISIBLE, w.one)
     w.move(left, w.literal(MAX_LAYERS), mask=MX)
@@ -47,17 +50,17 @@ def write_layers(w):
     w.subtract(left, left, w.literal(1), mask=MX)
     w.move(Reg.LIMITS, (Reg.HIT, X), mask=MX)
     w.label("shadow.layer")
-    w.trace(Reg.LIMITS, Reg.OWNER, _ANY_HIT | _HAS_LIMIT)
+    w.trace(Reg.LIMITS, lit, _ANY_HIT | _HAS_LIMIT)
     w.hit(Reg.T0, 1, mask=MX)
     w.branch(Condition.MISS, (Reg.T0, X), "layer.passed")
-    # Something solid would have stopped the light before, but for the triangle that it falls on.
     w.hit(Reg.T0, 0, mask=MX)
     w.branch(Condition.NOT_ZERO, (Reg.T0, X), "layer")
-    w.goto("layer.passed")
     w.label("layer.dark")
     w.pop(*SAVED)
+    w.move(Reg.OWNER, lit)
     w.move(Reg.LIMITS, (Reg.LIMITS, ZERO), mask=MX)
     w.goto("light.next")
     w.label("layer.passed")
     w.pop(*SAVED)
+    w.move(Reg.OWNER, lit)
     w.move(Reg.LIMITS, (Reg.LIMITS, ZERO), mask=MX)
