@@ -15,9 +15,9 @@ light       position, or       colour × intensity              axis × cone's s
 ==========  =================  ==============================  ==============================  =======================
 
 Record 0 is the globals; record 1 + m is that of matrix m, an instance's or a triangle's; the numbers of all others
-stand in those. A smooth record of 0 is none. Positions, normals, texture coordinates, ior and lights are floats, colours of
-globals and material have 16 fraction bits, and opacity, cutoff; emission; r₀, q, kₛ are bytes, the first the most
-significant. The flags of lights are in the lowest fraction bits of the floats 1/radius² and 1/reach².
+stand in those. A smooth record of 0 is none. Positions, normals, texture coordinates, ior and lights are floats,
+colours of globals and material have 16 fraction bits, and opacity, cutoff; emission; r₀, q, kₛ are bytes, the first the
+most significant. The flags of lights are in the lowest fraction bits of the floats 1/radius² and 1/reach².
 """
 
 from amaranth.lib import enum

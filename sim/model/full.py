@@ -1,11 +1,13 @@
 """A frame of full shading by the model: every packet's program, over all cores."""
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 
 from rtl.microcode import NUM_REGISTERS, constant_numbers
 from rtl.ray_generation import packet_order
-from rtl.shader_program import RAY_KINDS, ray_kind, stack_words
+from rtl.shader_program import RAY_KINDS, ray_kind, shader_program, stack_words
 from rtl.srgb import bright_bytes, dark_bytes, linear_colors
 
 from ..frame import Frame
@@ -154,7 +156,8 @@ def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_en
                     colors[row, column, lane] = packet_colors[ray, lane]
 
 
-def render_full(image: SceneImage, camera, width, height, *, config, program, features, offset_log2=OFFSET_LOG2):
+def render_full(image: SceneImage, camera, width, height, *, config, depth=4, features=None,
+                offset_log2=OFFSET_LOG2):
     """What a chip with full shading draws, bit for bit.
 
     Parameters
@@ -167,10 +170,10 @@ def render_full(image: SceneImage, camera, width, height, *, config, program, fe
         Size of the picture in pixels.
     config : ChipConfig
         The chip, of which mailbox, stack and arithmetic matter.
-    program : Program
-        See :func:`~rtl.shader_program.shader_program`.
-    features : ShaderFeatures
-        What the program was made of.
+    depth : int
+        Generations of secondary rays, 0…16.
+    features : ShaderFeatures, optional
+        What the program is made of, the depth included; default is the least that draws all that is in the scene.
     offset_log2 : int
         Logarithm of the offset against self-intersection, in units in the last place.
 
@@ -183,13 +186,14 @@ def render_full(image: SceneImage, camera, width, height, *, config, program, fe
     Raises
     ------
     ValueError
-        If the program lacks what the scene needs.
+        If the features lack what the scene needs.
     OverflowError
         If a packet needs more than a stack holds.
     """
+    features = features or replace(image.needs, depth=depth)
     if missing := features.missing(image.needs):
         raise ValueError(f"the shader's program lacks what the scene needs: {', '.join(missing)}")
-    fmt = image.fmt
+    fmt, program = image.fmt, shader_program(features=features)
     packets = np.array(list(packet_order(width, height)), np.int64)
     x = fmt.quantize(2.0 * np.arange(width) + 1 - width)
     y = fmt.quantize(height - 1 - 2.0 * np.arange(height))

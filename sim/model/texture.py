@@ -1,6 +1,6 @@
 """Texels by the chip's integers (docs/shading.md, section 8)."""
 
-import math
+import numpy as np
 
 from ..scene.texels import FILTERED, FOLDED
 from .compiled import compiled
@@ -15,7 +15,7 @@ def _fraction(s):
     """s less the whole number below, in units of 2⁻²⁴, cut."""
     if not abs(s) < 2.0**30:
         return 0
-    return int(math.floor(s * 2.0**_FRACTION_BITS)) & (1 << _FRACTION_BITS) - 1
+    return np.int64(np.floor(s * 2.0**_FRACTION_BITS)) & (1 << _FRACTION_BITS) - 1
 
 
 @compiled()

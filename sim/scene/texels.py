@@ -1,8 +1,8 @@
 """The texture memory: words of one texel each, in blocks of 2×2.
 
-Bits 0–7 of a word are red, 8–15 green, 16–23 blue, 24–31 opacity. Texel (column i, row j) of a texture W texels wide lies
-at base + 4·((j ≫ 1)·(max(W, 2) ≫ 1) + (i ≫ 1)) + 2·(j & 1) + (i & 1); sides of 1 are doubled. A texture is described by
-its base, a multiple of 4, and log₂ W | log₂ H ≪ 4 | filtered ≪ 8 | folded ≪ 9.
+Bits 0–7 of a word are red, 8–15 green, 16–23 blue, 24–31 opacity. Texel (column i, row j) of a texture W texels wide
+lies at base + 4·((j ≫ 1)·(max(W, 2) ≫ 1) + (i ≫ 1)) + 2·(j & 1) + (i & 1); sides of 1 are doubled. A texture is
+described by its base, a multiple of 4, and log₂ W | log₂ H ≪ 4 | filtered ≪ 8 | folded ≪ 9.
 """
 
 import numpy as np
