@@ -58,7 +58,7 @@ def shader_program(*, features):
     if features.transparency:
         w.branch(Condition.NONE, (Reg.OPACITY, X), "hole")
     write_normal(w)
-    w.on_flag(MaterialFlag.LIT, "unlit", clear=True)
+    w.on_flag(MaterialFlag.LIT, "dark", clear=True)
     write_lights(w)
     w.label("unlit")
     if features.shares:
@@ -68,16 +68,19 @@ def shader_program(*, features):
     _write_local(w)
     if features.children:
         write_children(w)
-    if features.transparency:
+    if not (features.children and features.transparency):
         w.goto("next")
+    w.label("dark")
+    w.move(Reg.FILTERED, (Reg.FILTERED, ZERO))
+    w.move(Reg.DIFFUSE, (Reg.FILTERED, ZERO))
+    w.goto("unlit")
+    if features.transparency:
         w.label("hole")
         w.branch(Condition.NONE, (Reg.STATE, Y), "next")
         w.label("hole.passed")
         w.subtract(Reg.STATE, Reg.STATE, w.literal(1), mask=MY)
         w.move(Reg.LENGTH, (Reg.HIT, X), mask=MX)
         w.goto("trace")
-    else:
-        w.goto("next")
     w.label("sky")
     write_sky(w)
     write_next(w)
@@ -93,22 +96,23 @@ def _write_primary(w):
     f, camera = w.features, constant_numbers["camera"]
     w.rows(Reg.DIRECTION, Reg.LIMITS, *camera, store=Store.DIRECTION)
     w.columns(Reg.ORIGIN, (Reg.LIMITS, (ONE, ZERO, ZERO)), constant_numbers["eye"], store=Store.ORIGIN)
-    w.move(Reg.LENGTH, (Reg.LIMITS, ZERO))
     if f.shares or f.highlights:
         w.rows(Reg.LENGTH, Reg.DIRECTION, None, None, Reg.DIRECTION, mask=MZ)
         w.root(Reg.LENGTH, (Reg.LENGTH, Z), mask=MY)
     w.move(Reg.SUM, (Reg.LIMITS, ZERO))
-    w.move(Reg.WEIGHT, w.one)
-    w.move(Reg.STATE, w.literal(f.depth, MAX_LAYERS, 0))
+    if f.shadows:
+        w.move(Reg.LIMITS, (Reg.LIMITS, ZERO), mask=MX)
+    if f.children:
+        w.move(Reg.WEIGHT, w.one)
+    if f.children or f.transparency:
+        w.move(Reg.STATE, w.literal(f.depth, MAX_LAYERS, 0))
     w.label("primary")
-    w.trace(Reg.LENGTH, w.literal(*_NO_OWNER), _SAME_ORIGIN)
+    w.trace(constant_numbers["zero"], w.literal(*_NO_OWNER), _SAME_ORIGIN)
 
 
 def _write_local(w):
     """What the surface sends itself, times the weight, to SUM."""
     f, light = w.features, Reg.U1
-    w.move(light, (light, ZERO))
-    w.on_flag(MaterialFlag.LIT, "dark", clear=True)
     w.cut(light, Reg.DIFFUSE)
     w.add(light, light, Reg.FILTERED)
     w.multiply(light, light, Reg.COLOR)
@@ -118,7 +122,7 @@ def _write_local(w):
         w.multiply(light, light, Reg.LOCAL)
         w.label(whole)
     if f.highlights:
-        w.on_flag(MaterialFlag.GLOSSY, "dark", clear=True)
+        w.on_flag(MaterialFlag.GLOSSY, "dull", clear=True)
         w.bytes(Reg.U2, (Reg.MATERIAL + 3, Z))
         w.multiply(Reg.U2, Reg.SPECULAR, (Reg.U2, Z))
         plain = w.fresh("plain")
@@ -126,7 +130,7 @@ def _write_local(w):
         w.multiply(Reg.U2, Reg.U2, Reg.COLOR)
         w.label(plain)
         w.add(light, light, Reg.U2)
-    w.label("dark")
+        w.label("dull")
     if f.emission:
         w.on_flag(MaterialFlag.SHINES, "faint", clear=True)
         w.decode(Reg.U2, (Reg.MATERIAL + 2, Z))
@@ -137,5 +141,6 @@ def _write_local(w):
         w.on_flag(MaterialFlag.BLEND, whole, clear=True)
         w.multiply(light, light, (Reg.OPACITY, X))
         w.label(whole)
-    w.multiply(light, light, Reg.WEIGHT)
+    if f.children:
+        w.multiply(light, light, Reg.WEIGHT)
     w.add(Reg.SUM, Reg.SUM, light)

@@ -37,7 +37,7 @@ class ShaderFeatures:
     Raises
     ------
     ValueError
-        For a depth out of range.
+        For a depth out of range, or refraction without reflection, which is needed where it is total.
     """
 
     reflection: bool = True
@@ -60,6 +60,8 @@ class ShaderFeatures:
     def __post_init__(self):
         if not 0 <= self.depth <= 16:
             raise ValueError(f"depth is {self.depth}; it must be from 0 to 16")
+        if self.refraction and not self.reflection:
+            raise ValueError("refraction needs reflection: where it is total, light is mirrored")
 
     def missing(self, needed):
         """Names of what ``needed`` (ShaderFeatures) has and this has not; a depth is no need."""
@@ -69,7 +71,7 @@ class ShaderFeatures:
     @property
     def shares(self):
         """Whether a surface may not keep all light for itself."""
-        return self.reflection or self.refraction
+        return self.reflection
 
     @property
     def clear(self):

@@ -11,7 +11,7 @@ MAX_LAYERS = 64
 _ANY_HIT, _HAS_LIMIT = 1, 2
 
 #: Registers that lie on the stack meanwhile.
-SAVED = (Reg.HIT, Reg.TRIANGLE, *range(Reg.MATERIAL, Reg.MATERIAL + 4), Reg.COLOR, Reg.OPACITY)
+SAVED = (Reg.HIT, Reg.TRIANGLE, *range(Reg.MATERIAL, Reg.MATERIAL + 4), Reg.OPACITY)
 
 
 def write_layers(w):

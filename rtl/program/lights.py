@@ -1,6 +1,6 @@
 """The light that reaches a point, light by light (docs/shading.md, section 5)."""
 
-from ..microcode import Condition, Op, Store, X, Y, Z
+from ..microcode import NO_TRIANGLE, Condition, Op, Store, X, Y, Z
 from .layers import write_layers
 from .records import MAX_CONE_SQUARINGS, FadeFlag, LightFlag, MaterialFlag
 from .writer import MX, MY, MYZ, MZ, ONE, ZERO, Reg
@@ -14,15 +14,9 @@ _MAX_SQUARINGS = 10
 def write_lights(w):
     """DIFFUSE, FILTERED (with ambient light), SPECULAR of the hit."""
     f, light = w.features, Reg.LIGHT
-    w.load(light, (Reg.LIMITS, ZERO))
-    w.move(Reg.FILTERED, light)
-    w.move(Reg.OWNER, (light + 3, X), mask=MZ)
-    w.move(Reg.STATE, (light + 3, Y), mask=MZ)
-    w.move(Reg.DIFFUSE, (Reg.DIFFUSE, ZERO))
-    if f.shadows:
-        w.move(Reg.LIMITS, (Reg.LIMITS, ZERO), mask=MX)
+    w.load(Reg.FILTERED, (Reg.FILTERED, ZERO))
+    w.move(Reg.OWNER, (Reg.RANGE, X), mask=MZ)
     if f.highlights:
-        w.move(Reg.SPECULAR, (Reg.SPECULAR, ZERO))
         dull = w.fresh("dull")
         w.on_flag(MaterialFlag.GLOSSY, dull, clear=True)
         w.columns(Reg.MIRRORED, (Reg.COSINE, (ONE, "-", X, "-", X)), Reg.DIRECTION, Reg.NORMAL, Reg.NORMAL)
@@ -30,23 +24,28 @@ def write_lights(w):
         w.label(dull)
     w.label("light")
     w.load(light, (Reg.OWNER, Z))
-    if f.near_lights and f.directional_lights:
-        w.on_bit((light + 3, X), LightFlag.DIRECTIONAL, "directional")
-    if f.near_lights:
-        _near(w)
     if f.directional_lights:
         if f.near_lights:
-            w.goto("light.arrives")
-        w.label("directional")
+            w.on_bit((light + 3, X), LightFlag.DIRECTIONAL, "near", clear=True)
         _directional(w)
-    w.label("light.arrives")
+        if f.near_lights:
+            w.goto("light.traced")
+            w.label("near")
+    if f.near_lights:
+        _near(w)
+    w.label("light.traced")
+    if f.shadows:
+        _shadowed(w)
     w.columns(Reg.DIFFUSE, (light + 2, (Z, ONE, ZERO)), light + 1, Reg.DIFFUSE)
     if f.highlights:
         w.label("light.shines")
         _highlight(w)
     w.label("light.next")
     w.add(Reg.OWNER, Reg.OWNER, w.literal(1), mask=MZ)
-    w.less((Reg.OWNER, Z), (Reg.STATE, Z), "light")
+    w.less((Reg.OWNER, Z), (Reg.RANGE, Y), "light")
+    if f.shadows and f.clear:
+        w.goto("unlit")
+        _through(w)
 
 
 def _near(w):
@@ -57,11 +56,11 @@ def _near(w):
     # |S|², N·S, and in a spot light scale · axis·S.
     w.rows(Reg.T0, Reg.TRAVEL, Reg.TRAVEL, Reg.NORMAL, light + 2)
     w.branch(Condition.NOT_NEGATIVE, (Reg.T0, Y), next_one)
-    w.root(Reg.T1, (Reg.T0, X))
     point = w.fresh("point")
     if f.spot_lights:
         if f.point_lights:
             w.on_bit((light + 3, X), LightFlag.SPOT, point, clear=True)
+        w.root(Reg.T1, (Reg.T0, X), mask=MX)
         # The cone's factor, in the last lane of T2.
         w.columns(Reg.T2, (Reg.T1, (X, ONE, ZERO)), Reg.T0, light + 3, mask=MZ)
         w.branch(Condition.NEGATIVE, (Reg.T2, Z), next_one)
@@ -76,15 +75,16 @@ def _near(w):
             w.on_bit((light + 3, Y), FadeFlag.SQUARINGS + k, squared, clear=True)
             w.scaled(Reg.T2, (Reg.T2, Z), Reg.T2, mask=MZ)
         w.label(squared)
+        w.move(light + 3, (Reg.T1, X), mask=MZ)
         if f.point_lights:
             w.goto(point + " too")
     if f.point_lights:
         w.label(point)
+        w.root(light + 3, (Reg.T0, X), mask=MZ)
         if f.spot_lights:
             w.move(Reg.T2, (Reg.T2, ONE), mask=MZ)
             w.label(point + " too")
     # |S|²/radius², |S|²/reach², N·S/|S|.
-    w.move(light + 3, (Reg.T1, X), mask=MZ)
     w.diagonal(Reg.T0, (Reg.T0, (X, X, Y)), light + 3)
     w.cut(Reg.T1, (Reg.T0, X), mask=MX)
     nearest = w.fresh("in the light")
@@ -109,7 +109,6 @@ def _near(w):
         w.columns(light, (light, (ONE, ZERO, ZERO)), light, store=Store.ORIGIN, mask=0)
         w.label("shadow.near")
         w.trace(Reg.LIMITS, Reg.OWNER, ANY_HIT | HAS_LIMIT | SAME_ORIGIN)
-        _shadowed(w)
 
 
 def _directional(w):
@@ -130,33 +129,27 @@ def _directional(w):
             w.move(Reg.LIMITS, (w.literal(float("inf")), X), mask=MY)
         w.label("shadow.directional")
         w.trace(Reg.LIMITS, Reg.OWNER, ANY_HIT)
-        _shadowed(w, last=True)
 
 
-def _shadowed(w, *, last=False):
+def _shadowed(w):
     """Goes on at the next light, or with what glass leaves, if something was hit."""
     w.hit(Reg.T0, 1, mask=MX)
-    if not w.features.clear:
-        w.branch(Condition.MISS, (Reg.T0, X), "light.arrives")
-        w.goto("light.next")
-        return
-    w.branch(Condition.MISS, (Reg.T0, X), "light.open")
-    if not last and w.features.directional_lights:
-        w.goto("shadow")
-        return
+    w.less((Reg.T0, X), (w.literal(NO_TRIANGLE), X), "shadow" if w.features.clear else "light.next")
+    if w.features.clear and w.features.highlights:
+        w.move(Reg.VISIBLE, w.one)
+
+
+def _through(w):
+    """What glass leaves of a light, to FILTERED."""
     w.label("shadow")
     w.hit(Reg.T0, 0, mask=MX)
     w.branch(Condition.ZERO, (Reg.T0, X), "light.next")
     write_layers(w)
-    light = Reg.LIGHT
-    w.scaled(Reg.T0, (light + 2, Z), light + 1)
+    w.scaled(Reg.T0, (Reg.LIGHT + 2, Z), Reg.LIGHT + 1)
     w.cut(Reg.T0, Reg.T0)
     w.multiply(Reg.T0, Reg.T0, Reg.VISIBLE)
     w.add(Reg.FILTERED, Reg.FILTERED, Reg.T0)
     w.goto("light.shines" if w.features.highlights else "light.next")
-    w.label("light.open")
-    if w.features.highlights:
-        w.move(Reg.VISIBLE, w.one)
 
 
 def _highlight(w):

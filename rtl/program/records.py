@@ -5,7 +5,8 @@ A record is twelve lanes, which a LOAD puts into four registers:
 ==========  =================  ==============================  ==============================  =======================
 record      register 0         1                               2                               3
 ==========  =================  ==============================  ==============================  =======================
-globals     ambient light      background                      sky: base, size, –              first light, end, –
+lights      ambient light      0, 0, 0                         0, 0, 0                         first light, end, –
+beyond      background         sky: base, size, –              –                               –
 triangle    flat unit normal   s₁ − s₀, t₁ − t₀, material      s₂ − s₀, t₂ − t₀, –             s₀, t₀, smooth record
 smooth      n₁ − n₀            n₂ − n₀                         n₀                              –
 instance    row 0 of A⁻¹       row 1                           row 2                           –
@@ -14,18 +15,22 @@ light       position, or       colour × intensity              axis × cone's s
             direction                                                                          cone's offset
 ==========  =================  ==============================  ==============================  =======================
 
-Record 0 is the globals; record 1 + m is that of matrix m, an instance's or a triangle's; the numbers of all others
-stand in those. A smooth record of 0 is none. Positions, normals, texture coordinates, ior and lights are floats,
-colours of globals and material have 16 fraction bits, and opacity, cutoff; emission; r₀, q, kₛ are bytes, the first the
-most significant. The flags of lights are in the lowest fraction bits of the floats 1/radius² and 1/reach².
+Record 0 is about all lights, 1 about what is beyond the scene; record 2 + m is that of matrix m, an instance's or a
+triangle's; the numbers of all others stand in those. A smooth record of 0 is none. Positions, normals, texture
+coordinates, ior and lights are floats, ambient light and colours of background and material have 16 fraction bits, and
+opacity, cutoff; emission; r₀, q, kₛ are bytes, the first the most significant. The flags of lights are in the lowest
+fraction bits of the floats 1/radius² and 1/reach².
 """
 
 from amaranth.lib import enum
 
-__all__ = ["FIRST_MATRIX", "MAX_CONE_SQUARINGS", "FadeFlag", "LightFlag", "MaterialFlag"]
+__all__ = ["BEYOND", "FIRST_MATRIX", "MAX_CONE_SQUARINGS", "FadeFlag", "LightFlag", "MaterialFlag"]
+
+#: Record of what is beyond the scene.
+BEYOND = 1
 
 #: Record of matrix 0.
-FIRST_MATRIX = 1
+FIRST_MATRIX = 2
 
 #: Times that a cone's cosine can be squared.
 MAX_CONE_SQUARINGS = 3

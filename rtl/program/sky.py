@@ -1,6 +1,7 @@
 """What rays see that meet nothing (docs/shading.md, section 9)."""
 
 from ..microcode import Condition, Op, X, Y, Z
+from .records import BEYOND
 from .writer import MX, MXY, MY, ONE, ZERO, Reg
 
 __all__ = ["write_sky"]
@@ -8,15 +9,16 @@ __all__ = ["write_sky"]
 
 def write_sky(w):
     """Adds the sky's, or the background's, colour to SUM."""
-    w.load(Reg.LIGHT, (Reg.SUM, ZERO))
-    color = Reg.LIGHT + 1
+    w.load(Reg.LIGHT, (Reg.SUM, ZERO), BEYOND)
+    color, texture = Reg.LIGHT, Reg.LIGHT + 1
     if w.features.sky:
-        w.branch(Condition.NONE, (Reg.LIGHT + 2, Y), "background")
+        w.branch(Condition.NONE, (texture, Y), "background")
         _octahedron(w)
-        w.emit(Op.TEXTURE, dst=Reg.T0, a=Reg.LIGHT + 2, x=Reg.T2)
+        w.emit(Op.TEXTURE, dst=Reg.T0, a=texture, x=Reg.T2)
         w.move(color, Reg.T0)
         w.label("background")
-    w.multiply(color, color, Reg.WEIGHT)
+    if w.features.children:
+        w.multiply(color, color, Reg.WEIGHT)
     w.add(Reg.SUM, Reg.SUM, color)
 
 

@@ -12,7 +12,6 @@ def write_look(w):
     material = Reg.MATERIAL
     w.load(Reg.TRIANGLE, (Reg.OWNER, X), FIRST_MATRIX)
     w.load(material, (Reg.TRIANGLE + 1, Z))
-    w.move(Reg.COLOR, material)
     alpha = w.features.transparency
     if alpha:
         w.move(Reg.OPACITY, w.one, mask=MX)

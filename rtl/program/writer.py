@@ -18,7 +18,7 @@ _MIN_WEIGHT = COLOR_ONE >> 12
 class Reg(enum.IntEnum):
     """The registers of a ray. Those of numbers 9 to 12, 27 to 30 and others are used anew where they are free."""
 
-    #: t_near, t_far of shadow rays, −strength of the light; screen coordinates at first.
+    #: t_near, 0, and t_far of shadow rays, −strength of the light; screen coordinates at first.
     LIMITS = 0
     #: Colours added so far.
     SUM = 1
@@ -28,7 +28,7 @@ class Reg(enum.IntEnum):
     DIRECTION = 4
     #: Triangle, instance, D′z or number of the light.
     OWNER = 5
-    #: Generations that may follow, holes that may follow, end of the lights.
+    #: Generations that may follow, holes that may follow, –.
     STATE = 6
     #: t_near, 1/d, d².
     LENGTH = 7
@@ -38,8 +38,8 @@ class Reg(enum.IntEnum):
     TRIANGLE = 9
     #: Four of them.
     MATERIAL = 13
-    #: Colour of the surface.
-    COLOR = 17
+    #: R/d.
+    MIRRORED = 17
     #: Opacity, –, where to return.
     OPACITY = 18
     #: N, unit, towards the viewer.
@@ -48,14 +48,14 @@ class Reg(enum.IntEnum):
     COSINE = 20
     #: P.
     POINT = 21
-    #: R/d.
-    MIRRORED = 22
+    #: Ambient light, and that through glass; this and the next three are a record.
+    FILTERED = 22
     #: Light by floats.
     DIFFUSE = 23
     #: Highlights.
     SPECULAR = 24
-    #: Ambient light, and that through glass.
-    FILTERED = 25
+    #: First light, end of the lights, –.
+    RANGE = 25
     #: What glass leaves of a light.
     VISIBLE = 26
     #: Four of them; records of all kinds.
@@ -64,6 +64,8 @@ class Reg(enum.IntEnum):
     TRAVEL = 31
 
     # Other names of the same registers.
+    #: Colour of the surface.
+    COLOR = 13
     #: What lies free while lights are looked at.
     T0 = 10
     T1 = 11

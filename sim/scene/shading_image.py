@@ -3,7 +3,7 @@
 import numpy as np
 
 from rtl.program.features import ShaderFeatures
-from rtl.program.records import FIRST_MATRIX, MAX_CONE_SQUARINGS, FadeFlag, LightFlag, MaterialFlag
+from rtl.program.records import BEYOND, FIRST_MATRIX, MAX_CONE_SQUARINGS, FadeFlag, LightFlag, MaterialFlag
 from rtl.srgb import COLOR_ONE, linear_colors
 
 from .error import SceneError
@@ -54,7 +54,8 @@ def needed_features(scene, *, instances, depth=4):
         return any(what(material) for material in materials)
 
     return ShaderFeatures(
-        reflection=some(lambda m: _byte(m.reflection) > 0 or m.fresnel),
+        # What cannot go through is mirrored.
+        reflection=some(lambda m: _byte(m.reflection) > 0 or m.fresnel or _byte(m.transmission) > 0),
         refraction=some(lambda m: _byte(m.transmission) > 0),
         transparency=some(lambda m: m.alpha_mode != "opaque"),
         textures=some(lambda m: m.texture is not None) and any(mesh.uvs is not None for mesh in scene.meshes),
@@ -109,8 +110,8 @@ def _globals(records, scene, background, sky, first_light, num_lights):
     ambient = np.rint(255 * np.array(ambient) / most) / 255 * most if most else np.zeros(3)
     table = linear_colors()
     records.integers(0, 0, np.minimum(np.rint(ambient * COLOR_ONE), (1 << 24) - 1).astype(np.int64))
-    records.integers(0, 3, [table[level] for level in background])
-    records.integers(0, 6, sky)
+    records.integers(BEYOND, 0, [table[level] for level in background])
+    records.integers(BEYOND, 3, sky)
     records.integers(0, 9, [first_light, first_light + num_lights])
 
 

@@ -13,8 +13,14 @@ SWITCHES = [field.name for field in fields(ShaderFeatures) if field.type is bool
 NOTHING = ShaderFeatures(**dict.fromkeys(SWITCHES, False), depth=0)
 LEAST = replace(NOTHING, point_lights=True)
 
-some_features = st.builds(ShaderFeatures, depth=st.integers(0, 16), **{name: st.booleans() for name in SWITCHES}).filter(
-    lambda features: features.point_lights or features.spot_lights or features.directional_lights)
+def _consistent(switches):
+    lights = switches["point_lights"] or switches["spot_lights"] or switches["directional_lights"]
+    return lights and switches["reflection"] >= switches["refraction"]
+
+
+some_features = st.builds(
+    lambda depth, switches: ShaderFeatures(depth=depth, **switches), st.integers(0, 16),
+    st.fixed_dictionaries({name: st.booleans() for name in SWITCHES}).filter(_consistent))
 
 
 def ops(features):
@@ -77,8 +83,7 @@ def test_what_is_off_takes_no_instruction(absent, features):
 
 @pytest.mark.parametrize("name", SWITCHES)
 def test_each_feature_takes_instructions(name):
-    # Of two that go together each alone may need more.
-    everything = ShaderFeatures()
+    everything = ShaderFeatures(refraction=name != "reflection")
     assert len(shader_program(features=replace(everything, **{name: False})).instructions) < len(
         shader_program(features=everything).instructions)
 
@@ -87,7 +92,7 @@ def test_the_whole_program_is_small():
     program = shader_program(features=ShaderFeatures(depth=16))
     assert len(program.instructions) <= 400
     assert len(program.literals) <= 16
-    assert len(shader_program(features=LEAST).instructions) <= 52
+    assert len(shader_program(features=LEAST).instructions) <= 45
 
 
 def test_only_vectors_are_stored():
@@ -103,7 +108,7 @@ def test_every_kind_of_ray_is_counted():
 
 
 def test_stack_words():
-    assert stack_words(ShaderFeatures(depth=4)) == 4 * 8 + 8
+    assert stack_words(ShaderFeatures(depth=4)) == 4 * 8 + 7
     assert stack_words(ShaderFeatures(depth=4, shadows=False)) == 4 * 8
     assert stack_words(replace(LEAST, depth=4, shadows=True)) == 0
 
@@ -113,8 +118,13 @@ def test_depth_out_of_range():
         ShaderFeatures(depth=17)
 
 
+def test_refraction_needs_reflection():
+    with pytest.raises(ValueError, match="refraction needs reflection"):
+        ShaderFeatures(reflection=False)
+
+
 def test_missing_features_by_name():
-    assert LEAST.missing(replace(LEAST, sky=True, refraction=True, depth=9)) == ["refraction", "sky"]
+    assert LEAST.missing(replace(LEAST, sky=True, emission=True, depth=9)) == ["emission", "sky"]
     assert ShaderFeatures(depth=0).missing(ShaderFeatures()) == []
 
 

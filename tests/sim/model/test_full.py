@@ -184,7 +184,7 @@ def test_the_stack_holds_two_rays_a_generation(depth):
 def test_a_shader_that_lacks_something_says_so():
     scene = SCENES["glass ball"]
     image = CompiledScene(scene, fmt=FORMAT).image(scene, eye=EYE.eye)
-    with pytest.raises(ValueError, match="lacks what the scene needs: refraction, sky$"):
+    with pytest.raises(ValueError, match=r"lacks what the scene needs: refraction, sky$"):
         render_full(image, EYE, *SIZE, config=ChipConfig(), features=replace(image.needs, refraction=False, sky=False))
 
 
