@@ -15,7 +15,7 @@ from rich.console import Console
 from fpu import FloatFormat
 from sim.golden import MAX_DEPTH, SHADINGS, psnr, render_golden
 from sim.machine import render_pysim, render_rtl
-from sim.model import render_model
+from sim.model import render_full, render_model
 from sim.scene import Sky, load_scene
 from sim.scene.compile import CompiledScene
 from sim.scene.texture import decode_texture
@@ -44,7 +44,7 @@ _CHECKED_PIXELS = 1 << 21
 @click.option("--frames", type=click.IntRange(min=1), help="Draw so many pictures of an animated scene, as "
               "NAME-0000.png and so on")
 @click.option("--shading", type=click.Choice(SHADINGS), default="simple", show_default=True, help="simple: colour "
-              "times cosine; full: lights, shadows, textures, reflection, refraction (with --engine golden)")
+              "times cosine; full: lights, shadows, textures, reflection, refraction (with --engine golden or model)")
 @click.option("--depth", type=click.IntRange(0, MAX_DEPTH), help="Generations of secondary rays of full shading  "
               "[default: 4]")
 @click.option("--sky", type=click.Path(dir_okay=False, path_type=Path), help="Panorama (equirectangular picture) "
@@ -86,7 +86,7 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
         if frames and not loaded.is_animated:
             raise BadInput(f"{scene}: nothing moves in this scene; leave --frames out")
         compiled = None
-        if shading == "simple" and (engine != "golden" or check):
+        if engine != "golden" or (shading == "simple" and check):
             with _progress(console, "building kd-trees"):
                 compiled = CompiledScene(loaded, fmt=fmt, stack_depth=config.stack_depth,
                                          index_width=config.index_width, flatten=flatten)
@@ -103,7 +103,7 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
                           seed, wave_file, wave_cycles, wave_pixels, console)
             _describe(frame, engine, scene, size, config)
             if check:
-                _compare(frame, engine, posed, compiled, view_now, size, config, background)
+                _compare(frame, engine, posed, compiled, view_now, size, config, background, shading, depth)
             name = output if not frames else output.with_name(f"{output.stem}-{number:04d}{output.suffix}")
             drawn.append((name, frame))
             _print_summary(console, name, frame)
@@ -124,8 +124,9 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
 
 
 def _check_shading(engine, shading, depth, sky):
-    if shading == "full" and engine != "golden":
-        raise click.UsageError(f"--shading full: the engine {engine} has the simple shader only; use --engine golden")
+    if shading == "full" and engine not in ("golden", "model"):
+        raise click.UsageError(f"--shading full: the engine {engine} has the simple shader only; use --engine golden "
+                               "or model")
     if depth is not None and shading != "full":
         raise click.UsageError("--depth is of full shading; use --shading full")
     if sky is not None and shading != "full":
@@ -191,12 +192,14 @@ def _draw(engine, scene, compiled, camera, size, config, background, shading, de
     begin = time.perf_counter()
     with _progress(console, f"drawing by {engine}") as progress:
         if engine == "golden":
-            frame = render_golden(scene, camera, *size, background=background, shading=shading,
-                                  depth=4 if depth is None else depth)
+            frame = render_golden(scene, camera, *size, background=background, shading=shading, depth=_depth(depth))
         else:
-            image = compiled.image(scene)
+            eye = camera.eye if shading == "full" else None
+            image = compiled.image(scene, eye=eye, background=background)
             common = dict(config=config, background=background)
-            if engine == "model":
+            if shading == "full":
+                frame = render_full(image, camera, *size, config=config, depth=_depth(depth))
+            elif engine == "model":
                 frame = render_model(image, camera, *size, **common)
             elif engine == "rtl":
                 frame = render_rtl(image, camera, *size, **common, latency=latency, jitter=jitter, seed=seed, wave=wave,
@@ -208,12 +211,16 @@ def _draw(engine, scene, compiled, camera, size, config, background, shading, de
     return frame
 
 
+def _depth(depth):
+    return 4 if depth is None else depth
+
+
 def _describe(frame, engine, scene, size, config):
     parameters = {name: value for name, value in vars(config).items() if name != "fmt"}
     frame.report.update(engine=engine, scene=str(scene), size=list(size), format=str(config.fmt), config=parameters)
 
 
-def _compare(frame, engine, scene, compiled, camera, size, config, background):
+def _compare(frame, engine, scene, compiled, camera, size, config, background, shading, depth):
     if size[0] * size[1] > _CHECKED_PIXELS:
         return
     if engine in ("rtl", "pysim"):
@@ -221,7 +228,7 @@ def _compare(frame, engine, scene, compiled, camera, size, config, background):
         frame.report["wrong_pixels_vs_model"] = int(frame.differs(model).sum())
         frame.report["counts"] = model.report["counts"]
     if engine != "golden":
-        golden = render_golden(scene, camera, *size, background=background)
+        golden = render_golden(scene, camera, *size, background=background, shading=shading, depth=_depth(depth))
         frame.report["wrong_pixels_vs_golden"] = int(frame.differs_in_surface(golden).sum())
         frame.report["psnr_vs_golden"] = psnr(frame.color, golden.color)
 

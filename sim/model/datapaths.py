@@ -15,16 +15,17 @@ _FUSED, _NARROW, _TRUNCATED, _RECIPROCAL = (
     _NUMBERS[name] for name in ("fused", "fused-narrow", "truncated", "reciprocal"))
 
 
-def _kernel(datapath, number=0):
-    return datapath(_ANY, arithmetic=ARITHMETICS[number]).kernel()
+def _kernel(datapath, number=0, **options):
+    return datapath(_ANY, arithmetic=ARITHMETICS[number], **options).kernel()
 
 
 _map_separate, _map_truncated = _kernel(transformation.affine_map), _kernel(transformation.affine_map, _TRUNCATED)
 _map_fused, _map_narrow = _kernel(transformation.affine_map, _FUSED), _kernel(transformation.affine_map, _NARROW)
 _step_divided, _step_truncated = _kernel(traversal.kd_step), _kernel(traversal.kd_step, _TRUNCATED)
 _step_multiplied = _kernel(traversal.kd_step, _RECIPROCAL)
-_triangle_nearest = _kernel(intersection.unit_triangle)
-_triangle_truncated = _kernel(intersection.unit_triangle, _TRUNCATED)
+# With t_near = 0 that of limited rays is the same as that of others.
+_triangle_nearest = _kernel(intersection.unit_triangle, limited=True)
+_triangle_truncated = _kernel(intersection.unit_triangle, _TRUNCATED, limited=True)
 
 
 # Where an arithmetic does not differ in its results it takes the first one's kernel: a quotient by table is the same.

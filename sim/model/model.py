@@ -9,7 +9,7 @@ from rtl.write_out import INTENSITY_BITS
 from ..frame import Frame
 from ..scene.image import SceneImage
 from .compiled import compiled
-from .packet import COUNTS, trace_packet
+from .packet import COUNTS, VECTORS, trace_packet, transform
 
 __all__ = ["camera_rows", "render_model"]
 
@@ -30,7 +30,10 @@ def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_en
             x, y, width, height, hits, owners, counts, whole):
     for number in numba.prange(len(packets)):
         px, py = packets[number]
-        screen = np.empty((4, 2))
+        matrix = np.zeros((4, 3))
+        matrix[:3] = camera[:3]
+        origins, directions, screen = np.empty((4, 3)), np.empty((4, 3)), np.ones(3)
+        limits, excluded, flags = np.zeros((4, 2)), np.full((4, 2), -1, np.int64), np.zeros(4, np.int64)
         packet_hits = np.empty((4, 4))
         packet_owners = np.empty((4, 2), np.int64)
         mask = 0
@@ -38,9 +41,14 @@ def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_en
             column, row = px + (ray & 1), py + (ray >> 1)
             if column < width and row < height:
                 mask |= 1 << ray
-                screen[ray, 0], screen[ray, 1] = x[column], y[row]
+                screen[0], screen[1] = x[column], y[row]
+                origins[ray] = camera[3]
+                directions[ray] = transform(arithmetic, params, matrix, screen, False)
+                counts[number, VECTORS] += 1
+        counts[number, VECTORS] += 1
         whole[number] = trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries,
-                                     stack_depth, camera, screen, mask, packet_hits, packet_owners, counts[number])
+                                     stack_depth, origins, directions, mask, limits, excluded, flags, True,
+                                     packet_hits, packet_owners, counts[number])
         for ray in range(4):
             if mask >> ray & 1:
                 hits[py + (ray >> 1), px + (ray & 1)] = packet_hits[ray]

@@ -2,30 +2,33 @@
 
 import numpy as np
 
-from ..scene.image import INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, UPPER_EMPTY
+from ..scene.image import INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, SOLID_ENTRY, UPPER_EMPTY
 from .compiled import compiled
 from .datapaths import affine_map, kd_step, unit_triangle
 
-__all__ = ["COUNTS", "trace_packet"]
+__all__ = ["ANY_HIT", "COUNTS", "HAS_LIMIT", "SAME_ORIGIN", "VECTORS", "trace_packet", "transform"]
 
+#: Flags of a ray: the first solid triangle ends it; it has a t_far; rays with the same number share their origin.
+ANY_HIT, HAS_LIMIT, SAME_ORIGIN = 1, 2, 4
 
 _VISIT, _LIST, _POP = range(3)
 
 #: What a packet's work is counted in.
 COUNTS = ("steps", "leaves", "entries", "transformed_vectors", "triangle_tests", "instances", "pops", "stack_depth")
-_STEPS, _LEAVES, _ENTRIES, _VECTORS, _TESTS, _INSTANCES, _POPS, _DEPTH = range(8)
+_STEPS, _LEAVES, _ENTRIES, VECTORS, _TESTS, _INSTANCES, _POPS, _DEPTH = range(8)
 
 
 @compiled()
-def _transform(arithmetic, params, matrix, vector, is_point):
+def transform(arithmetic, params, matrix, vector, is_point):
+    """A vector by a matrix float64[4, 3] of three rows and C, see :func:`rtl.transformation.affine_map`."""
     return affine_map(arithmetic, params, is_point, vector[0], vector[1], vector[2],
                       matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[0, 0], matrix[0, 1], matrix[0, 2],
                       matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[2, 0], matrix[2, 1], matrix[2, 2])
 
 
 @compiled()
-def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, camera,
-                 screen, mask, hits, owners, counts):
+def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, origins,
+                 directions, mask, limits, excluded, flags, is_shared, hits, owners, counts):
     """Traces four rays; see :func:`~sim.model.model.render_model` for what the arrays hold.
 
     Parameters
@@ -36,14 +39,20 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
         ``fmt.params``.
     root, nodes, splits, lists, matrices
         The memory image, floats decoded.
-    camera : float64[4, 3]
-        Rows and origin.
-    screen : float64[4, 2]
-        x and y of each ray.
+    origins, directions : float64[4, 3]
+        The rays.
     mask : int
         Rays that take part.
+    limits : float64[4, 2]
+        t_near and t_far of each ray.
+    excluded : int64[4, 2]
+        Triangle and instance that each ray does not hit; instance −1 for triangles outside of any.
+    flags : int64[4]
+        :data:`ANY_HIT` and :data:`HAS_LIMIT` of each ray.
+    is_shared : bool
+        All origins are the same, and are transformed once.
     hits : float64[4, 4]
-        Receives t, u, v, D′z of each ray.
+        Receives t, u, v, D′z of each ray. Of a ray with a limit that hits nothing, t is the limit.
     owners : int64[4, 2]
         Receives the triangle and the instance of each ray, −1 for none.
     counts : int64[8]
@@ -54,9 +63,9 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
     bool
         False if the stack is too small.
     """
-    origin = np.empty((2, 3))
+    origin = np.empty((2, 4, 3))
+    mapped = np.empty((4, 3))
     direction = np.empty((2, 4, 3))
-    vector = np.empty(3)
     interval = np.empty((2, 4, 2))
     stack_node = np.empty((2, stack_depth), np.int64)
     stack_mask = np.empty((2, stack_depth), np.int64)
@@ -70,16 +79,16 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
     next_letter = np.zeros(2, np.int64)
     child_interval = np.empty((2, 4, 2))
 
-    origin[0] = camera[3]
-    counts[_VECTORS] += 1
+    has_distance = 0
     for ray in range(4):
         owners[ray, 0] = owners[ray, 1] = -1
         if mask >> ray & 1:
-            counts[_VECTORS] += 1
-            vector[0], vector[1], vector[2] = screen[ray, 0], screen[ray, 1], 1.0
-            # The camera's origin is not mapped, so the fourth row of its matrix does not matter.
-            direction[0, ray] = _transform(arithmetic, params, camera, vector, False)
+            origin[0, ray] = origins[ray]
+            direction[0, ray] = directions[ray]
             interval[0, ray, 0], interval[0, ray, 1] = 0.0, np.inf
+            if flags[ray] & HAS_LIMIT:
+                hits[ray, 0] = limits[ray, 1]
+                has_distance |= 1 << ray
 
     level, node, instance, action = 0, root, -1, _VISIT
     while True:
@@ -100,7 +109,7 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
                 if not mask >> ray & 1:
                     continue
                 lower, upper, lower_near, lower_far, upper_near, upper_far, backward = kd_step(
-                    arithmetic, params, splits[node], origin[level, axis], direction[level, ray, axis],
+                    arithmetic, params, splits[node], origin[level, ray, axis], direction[level, ray, axis],
                     interval[level, ray, 0], interval[level, ray, 1])
                 if upper_first < 0:
                     upper_first = 1 if backward else 0
@@ -140,7 +149,7 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
             mask = 0
             for ray in range(4):
                 if stack_mask[level, entry] >> ray & 1:
-                    if owners[ray, 0] < 0 or stack_interval[level, entry, ray, 0] <= hits[ray, 0]:
+                    if not has_distance >> ray & 1 or stack_interval[level, entry, ray, 0] <= hits[ray, 0]:
                         mask |= 1 << ray
             if mask:
                 interval[level] = stack_interval[level, entry]
@@ -170,29 +179,40 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
                 wanted &= ~tested
             if wanted and word & INSTANCE_ENTRY:
                 counts[_INSTANCES] += 1
-                counts[_VECTORS] += 1
                 mask = wanted
                 letter_rays[1] = 0
                 next_letter[1] = 0
-                origin[1] = _transform(arithmetic, params, matrix, origin[0], True)
+                is_first = True
                 for ray in range(4):
                     if mask >> ray & 1:
-                        counts[_VECTORS] += 1
-                        direction[1, ray] = _transform(arithmetic, params, matrix, direction[0, ray], False)
+                        counts[VECTORS] += 2 if is_first or not is_shared else 1
+                        is_first = False
+                        origin[1, ray] = transform(arithmetic, params, matrix, origin[0, ray], True)
+                        direction[1, ray] = transform(arithmetic, params, matrix, direction[0, ray], False)
                         interval[1, ray, 0], interval[1, ray, 1] = 0.0, np.inf
                 level, sp[1], instance, node, action = 1, 0, index, index, _VISIT
                 continue
-            if wanted:
-                counts[_VECTORS] += 1
-                ox, oy, oz = _transform(arithmetic, params, matrix, origin[level], True)
-                for ray in range(4):
-                    if wanted >> ray & 1:
-                        counts[_VECTORS] += 1
-                        counts[_TESTS] += 1
-                        dx, dy, dz = _transform(arithmetic, params, matrix, direction[level, ray], False)
-                        t, u, v, hit, nearer = unit_triangle(arithmetic, params, ox, oy, oz, dx, dy, dz, hits[ray, 0])
-                        if hit and (nearer or owners[ray, 0] < 0):
-                            hits[ray, 0], hits[ray, 1], hits[ray, 2], hits[ray, 3] = t, u, v, dz
-                            owners[ray, 0] = index
-                            owners[ray, 1] = instance if level else -1
+            owner = instance if level else -1
+            is_first = True
+            for ray in range(4):
+                if not wanted >> ray & 1:
+                    continue
+                counts[VECTORS] += 2 if is_first or not is_shared else 1
+                counts[_TESTS] += 1
+                # A shared origin's map is that of the first ray.
+                if is_first or not is_shared:
+                    mapped[ray] = transform(arithmetic, params, matrix, origin[level, ray], True)
+                    first = ray
+                is_first = False
+                here = mapped[first]
+                dx, dy, dz = transform(arithmetic, params, matrix, direction[level, ray], False)
+                t, u, v, hit, nearer = unit_triangle(arithmetic, params, here[0], here[1], here[2], dx, dy, dz,
+                                                     hits[ray, 0], limits[ray, 0])
+                if (hit and (nearer or not has_distance >> ray & 1)
+                        and not (index == excluded[ray, 0] and owner == excluded[ray, 1])):
+                    hits[ray, 0], hits[ray, 1], hits[ray, 2], hits[ray, 3] = t, u, v, dz
+                    if word & SOLID_ENTRY and flags[ray] & ANY_HIT:
+                        hits[ray, 0] = 0.0
+                    has_distance |= 1 << ray
+                    owners[ray, 0], owners[ray, 1] = index, owner
             action = _POP if is_last[level] else _LIST

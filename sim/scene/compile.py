@@ -1,14 +1,17 @@
 """The scene compiler: from a scene to the chip's memory image."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from rtl.microcode import lane_width
+
 from .error import SceneError
-from .image import AXIS_SHIFT, INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, UPPER_EMPTY, SceneImage
+from .image import AXIS_SHIFT, INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, SOLID_ENTRY, UPPER_EMPTY, SceneImage
 from .kdtree import LEAF, build_kdtree
+from .shading_image import needed_features, shading_records
 from .triangles import pack_fields, unit_triangle_maps
 
 __all__ = ["CompiledScene", "compile_scene"]
@@ -35,7 +38,7 @@ class _Part:
     corners: np.ndarray
     instance: np.ndarray
     prim: np.ndarray
-    color: np.ndarray
+    material: np.ndarray
     rows: np.ndarray
     centers: np.ndarray
     tree: object
@@ -59,14 +62,14 @@ def _color_words(materials):
     return red << 16 | green << 8 | blue
 
 
-def _make_part(name, corners, instance, prim, color, normal_scale, *, fmt, stack_depth, warnings):
+def _make_part(name, corners, instance, prim, material, normal_scale, *, fmt, stack_depth, warnings):
     corners = fmt.quantize(corners)
     rows, centers, usable = unit_triangle_maps(corners, normal_scale=normal_scale)
     if not usable.all():
         warnings.append(f"mesh '{name}': {np.count_nonzero(~usable)} triangles dropped that have no area once their "
                         f"vertices are rounded to format {fmt}")
-    corners, instance, prim, color, rows, centers = (
-        array[usable] for array in (corners, instance, prim, color, rows, centers))
+    corners, instance, prim, material, rows, centers = (
+        array[usable] for array in (corners, instance, prim, material, rows, centers))
     overflow = ~np.isfinite(fmt.quantize(rows)).all(axis=(1, 2))
     if overflow.any():
         worst = np.flatnonzero(overflow)[0]
@@ -76,7 +79,7 @@ def _make_part(name, corners, instance, prim, color, normal_scale, *, fmt, stack
     tree = build_kdtree(corners.min(axis=1), corners.max(axis=1), triangles=corners, frac_width=fmt.frac_width,
                         min_normal=fmt.min_normal, pad=_PAD_ULP * 2.0 ** -fmt.frac_width,
                         intersection_cost=_TRIANGLE_COST, empty_bonus=_EMPTY_BONUS, max_depth=stack_depth)
-    return _Part(name, corners, instance, prim, color, rows, centers, tree)
+    return _Part(name, corners, instance, prim, material, rows, centers, tree)
 
 
 class CompiledScene:
@@ -110,19 +113,21 @@ class CompiledScene:
         if flatten is None:
             flatten = not scene.is_animated and len({i.mesh for i in scene.instances}) == len(scene.instances)
         self.is_flat = flatten
-        colors = _color_words(scene.materials)
+        self._colors = _color_words(scene.materials)
+        self._solid = np.array([material.alpha_mode == "opaque" and round(255 * material.transmission) == 0
+                                for material in scene.materials])
         self._parts = []
         self._spaces = []
         common = dict(fmt=fmt, stack_depth=stack_depth, warnings=self.warnings)
         if flatten:
             self.center, self.scale = _unit_box(*scene.bounds())
-            self._parts.append(self._flat_part(scene, colors, common))
+            self._parts.append(self._flat_part(scene, common))
         else:
             for mesh in scene.meshes:
-                self._parts.append(self._mesh_part(scene, mesh, colors, common))
+                self._parts.append(self._mesh_part(scene, mesh, common))
 
-    def _flat_part(self, scene, colors, common):
-        corners, instance, prim, color = [], [], [], []
+    def _flat_part(self, scene, common):
+        corners, instance, prim, material = [], [], [], []
         for number, placed in enumerate(scene.instances):
             mesh = scene.meshes[placed.mesh]
             linear, offset = placed.transform[:, :3], placed.transform[:, 3]
@@ -131,12 +136,16 @@ class CompiledScene:
             corners.append((world - self.center) * self.scale)
             instance.append(np.full(len(usable), number, np.int32))
             prim.append(usable.astype(np.int32))
-            color.append(colors[mesh.material_ids[usable]])
-        return _make_part("scene" if len(scene.instances) > 1 else scene.instances[0].name,
+            material.append(mesh.material_ids[usable])
+        part = _make_part("scene" if len(scene.instances) > 1 else scene.instances[0].name,
                           np.concatenate(corners), np.concatenate(instance), np.concatenate(prim),
-                          np.concatenate(color), 1 / self.scale, **common)
+                          np.concatenate(material), 1 / self.scale, **common)
+        # The front of a triangle is where it is in its mesh's space.
+        mirrored = np.array([np.linalg.det(placed.transform[:, :3]) < 0 for placed in scene.instances])
+        part.rows[mirrored[part.instance], 2] *= -1
+        return part
 
-    def _mesh_part(self, scene, mesh, colors, common):
+    def _mesh_part(self, scene, mesh, common):
         usable = np.flatnonzero(mesh.usable)
         scales = [abs(np.linalg.det(placed.transform[:, :3])) ** (1 / 3) for placed in scene.instances
                   if scene.meshes[placed.mesh] is mesh]
@@ -148,15 +157,20 @@ class CompiledScene:
         corners = (mesh.vertices[mesh.triangles[usable]] - center) * scale
         # D′z shall be the cosine in the world; all instances of a mesh share a matrix, hence their mean size.
         return _make_part(mesh.name, corners, np.full(len(usable), -1, np.int32), usable.astype(np.int32),
-                          colors[mesh.material_ids[usable]], float(np.mean(scales)) / scale, **common)
+                          mesh.material_ids[usable], float(np.mean(scales)) / scale, **common)
 
-    def image(self, scene):
+    def image(self, scene, *, eye=None, background=(0, 0, 0)):
         """The memory image with the instances where ``scene`` has them.
 
         Parameters
         ----------
         scene : Scene
             The scene that was compiled, or it at another time.
+        eye : float64[3], optional
+            Where the camera is, for an image with the records of full shading: a scene without lights is lit from
+            there.
+        background : tuple of int
+            Of full shading: sRGB-encoded bytes that rays see that hit nothing.
 
         Raises
         ------
@@ -171,7 +185,7 @@ class CompiledScene:
         node_words, list_words, bases = [], [], []
         node_base, list_base = first_tree, 0
         matrix_base = num_instances
-        matrices, shading, of_instance, of_prim = [], [], [], []
+        matrices, shading, of_instance, of_prim, shaded = [], [], [], [], []
         if self.is_flat:
             center, scale = self.center, self.scale
         else:
@@ -189,7 +203,7 @@ class CompiledScene:
             list_words.append(entries)
             node_base += len(nodes)
             list_base += len(entries)
-        for part in self._parts:
+        for number, part in enumerate(self._parts):
             bases.append(node_base)
             if part is None:
                 continue
@@ -198,14 +212,16 @@ class CompiledScene:
             order = order[np.argsort(first)]
             place = np.full(len(part.corners), -1, np.int64)
             place[order] = np.arange(len(order))
-            nodes, entries = self._tree_words(part.tree, node_base, list_base, 0, place, matrix_base)
+            kinds = np.where(self._solid[part.material], SOLID_ENTRY, 0)[part.tree.items]
+            nodes, entries = self._tree_words(part.tree, node_base, list_base, kinds, place, matrix_base)
             node_words.append(nodes)
             list_words.append(entries)
             node_base += len(nodes)
             list_base += len(entries)
+            shaded += self._shaded(scene, number, order, matrix_base)
             matrix_base += len(order)
             matrices.append(np.concatenate([part.rows[order], part.centers[order, None]], axis=1))
-            shading.append(part.color[order])
+            shading.append(self._colors[part.material[order]])
             of_instance.append(part.instance[order])
             of_prim.append(part.prim[order])
         starts = np.zeros((first_tree, 2), np.uint32)
@@ -220,7 +236,7 @@ class CompiledScene:
             if count > limit:
                 raise SceneError(f"scene needs {count:,} {name}, more than the {limit:,} that the chip's memory "
                                  f"addresses; leave objects out or build a chip with a wider index_width")
-        return SceneImage(
+        image = SceneImage(
             fmt=fmt, root=first_tree, nodes=nodes, lists=lists, matrices=pack_fields(fields, fmt.width),
             shading=np.concatenate(shading), num_instances=num_instances,
             stack_depth=max([part.tree.max_depth for part in self._parts if part is not None]
@@ -228,6 +244,21 @@ class CompiledScene:
             triangle_instance=np.concatenate(of_instance), triangle_prim=np.concatenate(of_prim),
             instance_ids=np.array(shown, np.int32), center=center, scale=scale,
             stats={"nodes": len(nodes), "list_entries": len(lists), "matrices": len(fields)})
+        if eye is None:
+            return image
+        records, texels = shading_records(scene, image, parts=shaded, eye=eye, background=background)
+        return replace(image, records=pack_fields(records, lane_width(fmt)), texels=texels,
+                       needs=needed_features(scene, instances=not self.is_flat),
+                       stats={**image.stats, "records": len(records), "texels": len(texels)})
+
+    def _shaded(self, scene, number, order, matrix_base):
+        """What :func:`~.shading_image.shading_records` wants to know of a part's triangles."""
+        part, numbers = self._parts[number], matrix_base + np.arange(len(order))
+        if not self.is_flat:
+            return [(scene.meshes[number], numbers, part.prim[order], None)]
+        of = part.instance[order]
+        return [(scene.meshes[placed.mesh], numbers[of == k], part.prim[order][of == k], placed.transform[:, :3])
+                for k, placed in enumerate(scene.instances)]
 
     def _place(self, scene, shown, center, scale):
         """Matrices of instances from the scene's into their meshes' space, and their boxes in the scene's."""

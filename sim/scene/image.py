@@ -8,10 +8,13 @@ memory    words  item
 nodes     2      bits 0–23 child, 24–25 axis (3: leaf), 26 lower child is empty, 27 upper child is empty; 32–… split
                  position as a float. Inner node: children are ``child`` (even) and ``child`` + 1. Leaf: ``child`` is
                  the first list entry. Nodes 0…n − 1 are where the n instances begin, each a copy of its mesh's root.
-lists     1      bits 0–23 matrix number, 30 it is an instance, 31 last of its leaf
+lists     1      bits 0–23 matrix number, 29 no light gets through, 30 it is an instance, 31 last of its leaf
 matrices  ⌈12·w  rows 0, 1, 2 of m (x, y, z each), then C: twelve floats of w bits, packed without gaps. Matrices
           ÷ 32⌉  0…n − 1 are those of the n instances, the others those of triangles.
 shading   1      of the triangle with that matrix number: bits 0–7 blue, 8–15 green, 16–23 red
+records   ⌈12·w  of full shading, instead: twelve lanes of w = max(bits of a float, 24) bits, packed likewise; see
+          ÷ 32⌉  rtl/program/records.py
+texels    1      of full shading: see :mod:`sim.scene.texels`
 ========  =====  =================================================================================================
 """
 
@@ -21,14 +24,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fpu import FloatFormat
+from rtl.microcode import lane_width
+from rtl.program.features import ShaderFeatures
 
 from .kdtree import LEAF
+from .triangles import unpack_fields
 
 __all__ = ["SceneImage", "describe"]
 
 AXIS_SHIFT, LOWER_EMPTY, UPPER_EMPTY = 24, 1 << 26, 1 << 27
 INDEX_MASK = (1 << 24) - 1
-INSTANCE_ENTRY, LAST_ENTRY = 1 << 30, 1 << 31
+SOLID_ENTRY, INSTANCE_ENTRY, LAST_ENTRY = 1 << 29, 1 << 30, 1 << 31
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +65,11 @@ class SceneImage:
         The chip's scene coordinates are (world − center) · scale.
     stats : dict
         Counts for reports.
+    records : uint32[R, W], optional
+    texels : uint32[K], optional
+        The memories of full shading.
+    needs : ShaderFeatures, optional
+        The least that draws all that is in the scene.
     """
 
     fmt: FloatFormat
@@ -75,17 +86,24 @@ class SceneImage:
     center: np.ndarray
     scale: float
     stats: dict = field(default_factory=dict)
+    records: np.ndarray | None = None
+    texels: np.ndarray | None = None
+    needs: ShaderFeatures | None = None
+
+    def _memories(self):
+        full = () if self.records is None else (self.records, self.texels)
+        return self.nodes, self.lists, self.matrices, *(full or (self.shading,))
 
     @property
     def num_bytes(self):
         """Size of all memories together."""
-        return sum(memory.nbytes for memory in (self.nodes, self.lists, self.matrices, self.shading))
+        return sum(memory.nbytes for memory in self._memories())
 
     @property
     def checksum(self):
         """CRC-32 of all memories."""
         crc = 0
-        for memory in (self.nodes, self.lists, self.matrices, self.shading):
+        for memory in self._memories():
             crc = zlib.crc32(memory.astype("<u4").tobytes(), crc)
         return crc
 
@@ -97,14 +115,12 @@ class SceneImage:
 
     def matrix_values(self):
         """float64[M, 4, 3]: the three rows and C of each matrix."""
-        width = self.fmt.width
-        values = np.empty((len(self.matrices), 12))
-        words = np.concatenate([self.matrices, np.zeros((len(self.matrices), 1), np.uint32)], axis=1).astype(np.uint64)
-        for k in range(12):
-            word, shift = divmod(k * width, 32)
-            pair = words[:, word] | words[:, word + 1] << np.uint64(32)
-            values[:, k] = self.fmt.decode(pair >> np.uint64(shift) & np.uint64((1 << width) - 1))
-        return values.reshape(-1, 4, 3)
+        return self.fmt.decode(unpack_fields(self.matrices, self.fmt.width)).reshape(-1, 4, 3)
+
+    def record_lanes(self):
+        """Lanes of the records: as floats float64[R, 12], and as integers int64[R, 12]."""
+        fields = unpack_fields(self.records, lane_width(self.fmt))
+        return self.fmt.decode(fields & (1 << self.fmt.width) - 1), fields
 
     def split_values(self):
         """float64[N]: the split position of each node."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-__all__ = ["pack_fields", "unit_triangle_maps"]
+__all__ = ["pack_fields", "unit_triangle_maps", "unpack_fields"]
 
 
 def unit_triangle_maps(corners, *, normal_scale):
@@ -65,3 +65,14 @@ def pack_fields(fields, width):
         words[:, word] |= value & np.uint64(0xFFFFFFFF)
         words[:, word + 1] |= value >> np.uint64(32)
     return words[:, :-1].astype(np.uint32)
+
+
+def unpack_fields(words, width, count=12):
+    """What :func:`pack_fields` has packed, int64[N, count]."""
+    padded = np.concatenate([words, np.zeros((len(words), 1), np.uint32)], axis=1).astype(np.uint64)
+    fields = np.empty((len(words), count), np.int64)
+    for k in range(count):
+        word, shift = divmod(k * width, 32)
+        pair = padded[:, word] | padded[:, word + 1] << np.uint64(32)
+        fields[:, k] = pair >> np.uint64(shift) & np.uint64((1 << width) - 1)
+    return fields
