@@ -1,11 +1,13 @@
 """The parameters of a whole chip; below the top, units take plain keyword arguments."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from fpu import FloatFormat
 
 from .arithmetic import ARITHMETICS
-from .microcode import Program
+from .program.features import ShaderFeatures
+from .shader_program import shader_program, stack_words
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,10 @@ class ChipConfig:
         Which of :data:`~rtl.arithmetic.ARITHMETICS` it computes by.
     num_pipelines : int
         Pipelines behind one ray generation controller, 1…4.
-    program : :class:`~rtl.microcode.Program`, optional
-        What the shader does; without, triangles have one colour each and no rays but the primary ones.
-    ray_stack_depth : int
-        Registers on the stack of a ray in the shader.
+    shader : :class:`~rtl.program.features.ShaderFeatures`, optional
+        What the shader is able to do; without one, triangles have one colour each and no rays but the primary ones.
+    offset_log2 : int
+        Logarithm of the shader's offset against self-intersection, in units in the last place.
     shading_lines, texture_lines, texture_line_items : int
         Lines of the shader's caches, if it has them: of records, of which one is a line, and of texels.
 
@@ -73,8 +75,8 @@ class ChipConfig:
     coord_width: int = 12
     arithmetic: int = 0
     num_pipelines: int = 1
-    program: Program | None = None
-    ray_stack_depth: int = 32
+    shader: ShaderFeatures | None = None
+    offset_log2: int = 3
     shading_lines: int = 128
     texture_lines: int = 256
     texture_line_items: int = 4
@@ -86,7 +88,7 @@ class ChipConfig:
             "node_lines": (2, 1 << 16), "node_line_items": (1, 8), "list_lines": (2, 1 << 16),
             "list_line_items": (1, 16), "matrix_lines": (2, 1 << 16), "num_fetches": (1, 16),
             "index_width": (8, 24), "coord_width": (4, 14),
-            "arithmetic": (0, len(ARITHMETICS) - 1), "num_pipelines": (1, 4), "ray_stack_depth": (1, 256),
+            "arithmetic": (0, len(ARITHMETICS) - 1), "num_pipelines": (1, 4), "offset_log2": (0, 8),
             "shading_lines": (2, 1 << 16), "texture_lines": (2, 1 << 16), "texture_line_items": (1, 16),
         }
         for name, (low, high) in ranges.items():
@@ -97,6 +99,16 @@ class ChipConfig:
                      "shading_lines", "texture_lines", "texture_line_items"):
             if getattr(self, name).bit_count() != 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be a power of two")
+
+    @cached_property
+    def program(self):
+        """The shader's program, or None."""
+        return None if self.shader is None else shader_program(features=self.shader)
+
+    @property
+    def ray_stack_depth(self):
+        """Registers on the stack of a ray in the shader."""
+        return 0 if self.shader is None else max(stack_words(self.shader), 1)
 
     @property
     def latencies(self):

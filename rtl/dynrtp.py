@@ -24,6 +24,7 @@ from .ray_generation import packet_layout
 from .ray_store import RayStore
 from .shader import Shader, shader_shapes
 from .stack import TraversalStack
+from .texture import Texture
 from .threads import Threads
 from .transformation import Transformation
 from .traversal import Traversal
@@ -198,7 +199,8 @@ class DynRTP(wiring.Component):
         ]
         wiring.connect(m, wiring.flipped(self.packet), threads.packet)
         if has_shader:
-            color = Shader(**shader_parameters, stack_depth=config.stack_depth, coord_width=config.coord_width)
+            color = Shader(**shader_parameters, stack_depth=config.stack_depth, coord_width=config.coord_width,
+                           offset_log2=config.offset_log2)
             m.submodules.shader = color
             self._connect_shader(m, caches, color, transformation, intersection)
             wiring.connect(m, threads.primary, color.primary)
@@ -297,7 +299,6 @@ class DynRTP(wiring.Component):
                               payload_shape=shader.load.payload.payload.shape(), num_waiting=num_rays)
         caches["shading"] = records
         if "textures" in cache_names(config):
-            from .texture import Texture
             m.submodules.texture = texture = Texture(
                 fmt=config.fmt, payload_shape=shader.texture.payload.payload.shape(), num_lines=config.texture_lines,
                 line_items=config.texture_line_items, num_fetches=config.num_fetches, index_width=config.index_width)

@@ -26,7 +26,7 @@ def compiler(name, *folders):
     """
     digest = hashlib.sha256()
     for folder in folders:
-        for path in sorted((_TOP / folder).glob("*.py")):
+        for path in sorted((_TOP / folder).rglob("*.py")):
             digest.update(path.read_bytes())
     kept = cache_directory() / name / digest.hexdigest()[:20]
 

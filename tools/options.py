@@ -47,7 +47,7 @@ def _cycles(text):
     return tuple(map(int, match.groups()))
 
 
-_PARAMETERS = {field.name for field in fields(ChipConfig)} - {"fmt"}
+_PARAMETERS = {field.name for field in fields(ChipConfig)} - {"fmt", "shader"}
 
 
 def _chip(text):

