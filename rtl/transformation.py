@@ -132,7 +132,8 @@ class Transformation(wiring.Component):
         current = Signal(current_layout, reset_less=True)
         active = Signal()
         origin_next, first = Signal(reset_less=True), Signal(reset_less=True)
-        shared = current.shared if self._tag is not None else Const(1, 1)
+        has_shader = self._tag is not None
+        shared = current.shared if has_shader else Const(1, 1)
         remaining = Signal(PACKET_RAYS, reset_less=True)
         ray = Signal(range(PACKET_RAYS))
         others = Signal(PACKET_RAYS)
@@ -172,7 +173,8 @@ class Transformation(wiring.Component):
             self.vector_address.thread.eq(token.thread),
             self.vector_address.level.eq(token.level),
             self.vector_address.is_origin.eq(origin_next),
-            self.vector_address.ray.eq(Mux(origin_next & shared, 0, ray)),
+            # The shader stores a ray's origin as its own, even if others have the same.
+            self.vector_address.ray.eq(Mux(origin_next & shared & (token.level if has_shader else 1), 0, ray)),
             self.entered.valid.eq(active & origin_next & (current.kind == Kind.INSTANCE)),
             self.entered.thread.eq(token.thread),
             self.entered.index.eq(current.job.index),
