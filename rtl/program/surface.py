@@ -60,12 +60,13 @@ def _unit(w):
 
 
 def _towards_viewer(w, side):
-    """NORMAL by the side that is seen, and COSINE."""
+    """NORMAL by the side that is seen, and COSINE where it matters."""
     front = w.fresh("front")
     w.branch(Condition.NEGATIVE, side, front)
     w.move(Reg.NORMAL, (Reg.NORMAL, ("-", X, "-", Y, "-", Z)))
     w.label(front)
-    w.rows(Reg.COSINE, Reg.NORMAL, Reg.DIRECTION, Reg.DIRECTION, Reg.DIRECTION)
+    if w.features.shares or w.features.highlights:
+        w.rows(Reg.COSINE, Reg.NORMAL, Reg.DIRECTION, Reg.DIRECTION, Reg.DIRECTION)
 
 
 def write_normal(w):

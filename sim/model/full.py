@@ -184,7 +184,7 @@ def render_full(image: SceneImage, camera, width, height, *, config, depth=4, fe
     -------
     Frame
         Its hits are those of primary rays. Its report has the ``counts`` of :data:`~sim.model.packet.COUNTS` and
-        :data:`~sim.model.shader.SHADER_COUNTS`, and ``ray_kinds``.
+        :data:`~sim.model.shader.SHADER_COUNTS`, ``ray_kinds``, the length of the ``program``, and ``packets_traced``.
 
     Raises
     ------
@@ -229,5 +229,6 @@ def render_full(image: SceneImage, camera, width, height, *, config, depth=4, fe
     shader_sums[2] = shader_counts[:, 2].max(initial=0)
     frame.report["counts"] = dict(zip((*COUNTS, *SHADER_COUNTS), [*sums.tolist(), *shader_sums.tolist()], strict=False))
     frame.report["ray_kinds"] = dict(zip(RAY_KINDS, shader_sums[len(SHADER_COUNTS):].tolist(), strict=False))
+    frame.report["program"] = len(program.instructions)
     frame.report["packets_traced"] = int(shader_sums[_TRACES])
     return frame
