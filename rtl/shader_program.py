@@ -47,9 +47,9 @@ def shader_program(*, features):
     w = Writer(features)
     _write_primary(w)
     w.label("hit")
-    w.hit(Reg.HIT, 0)
     w.hit(Reg.OWNER, 1)
     w.branch(Condition.MISS, (Reg.OWNER, X), "sky")
+    w.hit(Reg.HIT, 0)
     is_called = features.shadows and features.clear
     if is_called:
         w.emit(Op.CALL, dst=Reg.OPACITY, mask=MZ, target="look")

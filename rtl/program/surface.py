@@ -42,14 +42,12 @@ def write_look(w):
         w.label(blend)
 
 
-def _to_world(w):
-    """NORMAL by A⁻ᵀ of the instance."""
+def _to_world(w, outside):
+    """NORMAL by A⁻ᵀ of the instance; goes on at ``outside`` if it is in none."""
     if w.features.instances:
-        there = w.fresh("in the world")
-        w.branch(Condition.MISS, (Reg.OWNER, Y), there)
+        w.branch(Condition.MISS, (Reg.OWNER, Y), outside)
         w.load(Reg.LIGHT, (Reg.OWNER, Y), FIRST_MATRIX)
         w.columns(Reg.NORMAL, Reg.NORMAL, Reg.LIGHT, Reg.LIGHT + 1, Reg.LIGHT + 2)
-        w.label(there)
 
 
 def _unit(w):
@@ -60,30 +58,33 @@ def _unit(w):
 
 
 def _towards_viewer(w, side):
-    """NORMAL by the side that is seen, and COSINE."""
+    """NORMAL by the side that is seen, and COSINE where it matters."""
     front = w.fresh("front")
     w.branch(Condition.NEGATIVE, side, front)
     w.move(Reg.NORMAL, (Reg.NORMAL, ("-", X, "-", Y, "-", Z)))
     w.label(front)
-    w.rows(Reg.COSINE, Reg.NORMAL, Reg.DIRECTION, Reg.DIRECTION, Reg.DIRECTION)
+    if w.features.shares or w.features.highlights:
+        w.rows(Reg.COSINE, Reg.NORMAL, Reg.DIRECTION, Reg.DIRECTION, Reg.DIRECTION)
 
 
 def write_normal(w):
     """Of the hit: NORMAL, COSINE, POINT; D′z in HIT."""
+    known = w.fresh("unit normal")
     if w.features.smooth:
         flat, mixed = w.fresh("flat"), w.fresh("mixed")
         w.branch(Condition.NONE, (Reg.TRIANGLE + 3, Z), flat)
         w.load(Reg.LIGHT, (Reg.TRIANGLE + 3, Z))
         w.columns(Reg.NORMAL, (Reg.HIT, (Y, Z, ONE)), Reg.LIGHT, Reg.LIGHT + 1, Reg.LIGHT + 2)
-        w.goto(mixed)
-        w.label(flat)
-        w.move(Reg.NORMAL, Reg.TRIANGLE)
+        _to_world(w, mixed)
         w.label(mixed)
-    else:
-        w.move(Reg.NORMAL, Reg.TRIANGLE)
-    _to_world(w)
-    if w.features.instances or w.features.smooth:
         _unit(w)
+        w.goto(known)
+        w.label(flat)
+    w.move(Reg.NORMAL, Reg.TRIANGLE)
+    if w.features.instances:
+        _to_world(w, known)
+        _unit(w)
+    w.label(known)
     _towards_viewer(w, (Reg.OWNER, Z))
     w.columns(Reg.POINT, (Reg.HIT, (ONE, X, ZERO)), Reg.ORIGIN, Reg.DIRECTION)
     if w.features.shares:
@@ -96,9 +97,11 @@ def write_flat_normal(w):
         return
     steady = w.fresh("steady")
     w.branch(Condition.NEGATIVE, (Reg.COSINE, X), steady)
+    known = w.fresh("unit normal")
     w.move(Reg.NORMAL, Reg.TRIANGLE)
-    _to_world(w)
     if w.features.instances:
+        _to_world(w, known)
         _unit(w)
+    w.label(known)
     _towards_viewer(w, (Reg.HIT, Y))
     w.label(steady)

@@ -91,6 +91,19 @@ def test_full_shading(tmp_path):
     assert levels[1]["rays"] == sum(levels[0][kind] for kind in ("reflection", "refraction", "transparency")) > 0
 
 
+def test_full_shading_by_the_model(tmp_path):
+    report = tmp_path / "report.json"
+    result = run("render", "walk", "-o", tmp_path / "walk.png", "--engine", "model", "--shading", "full", "--size",
+                 "64x48", "--depth", "2", "--frames", "2", "--report", report)
+    assert result.exit_code == 0, result.output
+    assert "PSNR" in result.output
+    for frame in json.loads(report.read_text()):
+        assert frame["psnr_vs_golden"] >= 45
+        assert frame["wrong_pixels_vs_golden"] <= 0.002 * 64 * 48
+        assert frame["ray_kinds"]["primary"] == 64 * 48
+        assert frame["memory"]["records"] > 0
+
+
 def test_a_panorama_as_the_sky(tmp_path):
     panorama = np.zeros((64, 128, 3), np.uint8)
     panorama[:] = (10, 90, 200)
