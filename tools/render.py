@@ -4,7 +4,7 @@ import contextlib
 import json
 import sys
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import click
@@ -44,7 +44,7 @@ _CHECKED_PIXELS = 1 << 21
 @click.option("--frames", type=click.IntRange(min=1), help="Draw so many pictures of an animated scene, as "
               "NAME-0000.png and so on")
 @click.option("--shading", type=click.Choice(SHADINGS), default="simple", show_default=True, help="simple: colour "
-              "times cosine; full: lights, shadows, textures, reflection, refraction (with --engine golden or model)")
+              "times cosine; full: lights, shadows, textures, reflection, refraction")
 @click.option("--depth", type=click.IntRange(0, MAX_DEPTH), help="Generations of secondary rays of full shading  "
               "[default: 4]")
 @click.option("--sky", type=click.Path(dir_okay=False, path_type=Path), help="Panorama (equirectangular picture) "
@@ -71,7 +71,7 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
     """Draw SCENE: an .obj, .ply, .ply.gz, .gltf or .glb file, or a built-in one: room, mirror-room, vpl, walk or
     sunflowers."""
     config = chip_config(fmt, parameters)
-    _check_shading(engine, shading, depth, sky)
+    _check_shading(engine, shading, depth, sky, hits)
     _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames, hits)
     output = output or Path(f"{Path(scene).name.split('.')[0]}.png")
     for path in (output, wave, hits, report):
@@ -99,11 +99,11 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
         for number, at in enumerate(times):
             posed = loaded.at_time(at)
             view_now = chosen if camera is not None else _camera(posed, None, view)
-            frame = _draw(engine, posed, compiled, view_now, size, config, background, shading, depth, latency, jitter,
-                          seed, wave_file, wave_cycles, wave_pixels, console)
-            _describe(frame, engine, scene, size, config)
+            frame, image, chip = _draw(engine, posed, compiled, view_now, size, config, background, shading, depth,
+                                       latency, jitter, seed, wave_file, wave_cycles, wave_pixels, console)
+            _describe(frame, engine, scene, size, chip)
             if check:
-                _compare(frame, engine, posed, compiled, view_now, size, config, background, shading, depth)
+                _compare(frame, engine, posed, image, view_now, size, chip, background, shading, depth)
             name = output if not frames else output.with_name(f"{output.stem}-{number:04d}{output.suffix}")
             drawn.append((name, frame))
             _print_summary(console, name, frame)
@@ -123,12 +123,12 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
                 path.write_text(json.dumps(reports if frames else reports[0], indent=1) + "\n")
 
 
-def _check_shading(engine, shading, depth, sky):
-    if shading == "full" and engine not in ("golden", "model"):
-        raise click.UsageError(f"--shading full: the engine {engine} has the simple shader only; use --engine golden "
-                               "or model")
+def _check_shading(engine, shading, depth, sky, hits):
     if depth is not None and shading != "full":
         raise click.UsageError("--depth is of full shading; use --shading full")
+    if hits is not None and shading == "full" and engine in ("rtl", "pysim"):
+        raise click.UsageError(f"--hits: a chip with full shading keeps no hits; use --engine model, or --shading simple "
+                               f"with --engine {engine}")
     if sky is not None and shading != "full":
         raise click.UsageError("--sky is of full shading; use --shading full")
 
@@ -189,15 +189,19 @@ def _progress(console, what):
 
 def _draw(engine, scene, compiled, camera, size, config, background, shading, depth, latency, jitter, seed, wave,
           wave_cycles, wave_pixels, console):
+    """The frame, the image that the engine had of the scene, if any, and the chip, with a shader if it needs one."""
     begin = time.perf_counter()
+    image = None
     with _progress(console, f"drawing by {engine}") as progress:
         if engine == "golden":
             frame = render_golden(scene, camera, *size, background=background, shading=shading, depth=_depth(depth))
         else:
             eye = camera.eye if shading == "full" else None
             image = compiled.image(scene, eye=eye, background=background)
-            common = dict(config=config, background=background)
             if shading == "full":
+                config = _with_shader(config, image, depth)
+            common = dict(config=config, background=background)
+            if shading == "full" and engine == "model":
                 frame = render_full(image, camera, *size, config=config, depth=_depth(depth))
             elif engine == "model":
                 frame = render_model(image, camera, *size, **common)
@@ -208,7 +212,12 @@ def _draw(engine, scene, compiled, camera, size, config, background, shading, de
                 frame = render_pysim(image, camera, *size, **common, latency=latency, wave=wave, progress=progress)
             frame.report["memory"] = {**image.stats, "bytes": image.num_bytes, "crc32": f"{image.checksum:08x}"}
     frame.report["seconds"] = time.perf_counter() - begin
-    return frame
+    return frame, image, config
+
+
+def _with_shader(config, image, depth):
+    """The chip with a shader that does what the scene needs, and no more."""
+    return replace(config, shader=replace(image.needs, depth=_depth(depth)))
 
 
 def _depth(depth):
@@ -216,20 +225,28 @@ def _depth(depth):
 
 
 def _describe(frame, engine, scene, size, config):
-    parameters = {name: value for name, value in vars(config).items() if name != "fmt"}
+    parameters = asdict(config)
+    del parameters["fmt"]
     frame.report.update(engine=engine, scene=str(scene), size=list(size), format=str(config.fmt), config=parameters)
 
 
-def _compare(frame, engine, scene, compiled, camera, size, config, background, shading, depth):
+def _compare(frame, engine, scene, image, camera, size, config, background, shading, depth):
     if size[0] * size[1] > _CHECKED_PIXELS:
         return
     if engine in ("rtl", "pysim"):
-        model = render_model(compiled.image(scene), camera, *size, config=config, background=background)
-        frame.report["wrong_pixels_vs_model"] = int(frame.differs(model).sum())
-        frame.report["counts"] = model.report["counts"]
+        if shading == "full":
+            model = render_full(image, camera, *size, config=config, depth=_depth(depth))
+            differs = (frame.color != model.color).any(axis=-1)
+        else:
+            model = render_model(image, camera, *size, config=config, background=background)
+            differs = frame.differs(model)
+        frame.report["wrong_pixels_vs_model"] = int(differs.sum())
+        frame.report.update({name: model.report[name] for name in ("counts", "ray_kinds") if name in model.report})
     if engine != "golden":
         golden = render_golden(scene, camera, *size, background=background, shading=shading, depth=_depth(depth))
-        frame.report["wrong_pixels_vs_golden"] = int(frame.differs_in_surface(golden).sum())
+        # A chip with full shading keeps no hits; its model does.
+        surface = model if shading == "full" and engine in ("rtl", "pysim") else frame
+        frame.report["wrong_pixels_vs_golden"] = int(surface.differs_in_surface(golden).sum())
         frame.report["psnr_vs_golden"] = psnr(frame.color, golden.color)
 
 
