@@ -76,7 +76,7 @@ class ChipConfig:
     arithmetic: int = 0
     num_pipelines: int = 1
     shader: ShaderFeatures | None = None
-    offset_log2: int = 3
+    offset_log2: int = 1
     shading_lines: int = 128
     texture_lines: int = 256
     texture_line_items: int = 4

@@ -75,7 +75,7 @@ class Shader(wiring.Component):
     """
 
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, coord_width, program, ray_stack_depth,
-                 offset_log2=3):
+                 offset_log2=1):
         self._fmt = fmt
         self._num_threads = num_threads
         self._coord_width = coord_width

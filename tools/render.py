@@ -127,8 +127,8 @@ def _check_shading(engine, shading, depth, sky, hits):
     if depth is not None and shading != "full":
         raise click.UsageError("--depth is of full shading; use --shading full")
     if hits is not None and shading == "full" and engine in ("rtl", "pysim"):
-        raise click.UsageError(f"--hits: a chip with full shading keeps no hits; use --engine model, or --shading simple "
-                               f"with --engine {engine}")
+        raise click.UsageError("--hits: a chip with full shading keeps no hits; use --engine model, or --shading "
+                               f"simple with --engine {engine}")
     if sky is not None and shading != "full":
         raise click.UsageError("--sky is of full shading; use --shading full")
 
@@ -199,10 +199,11 @@ def _draw(engine, scene, compiled, camera, size, config, background, shading, de
             eye = camera.eye if shading == "full" else None
             image = compiled.image(scene, eye=eye, background=background)
             if shading == "full":
-                config = _with_shader(config, image, depth)
+                # A shader that does what the scene needs, and no more.
+                config = replace(config, shader=replace(image.needs, depth=_depth(depth)))
             common = dict(config=config, background=background)
             if shading == "full" and engine == "model":
-                frame = render_full(image, camera, *size, config=config, depth=_depth(depth))
+                frame = render_full(image, camera, *size, config=config)
             elif engine == "model":
                 frame = render_model(image, camera, *size, **common)
             elif engine == "rtl":
@@ -213,11 +214,6 @@ def _draw(engine, scene, compiled, camera, size, config, background, shading, de
             frame.report["memory"] = {**image.stats, "bytes": image.num_bytes, "crc32": f"{image.checksum:08x}"}
     frame.report["seconds"] = time.perf_counter() - begin
     return frame, image, config
-
-
-def _with_shader(config, image, depth):
-    """The chip with a shader that does what the scene needs, and no more."""
-    return replace(config, shader=replace(image.needs, depth=_depth(depth)))
 
 
 def _depth(depth):
@@ -235,7 +231,7 @@ def _compare(frame, engine, scene, image, camera, size, config, background, shad
         return
     if engine in ("rtl", "pysim"):
         if shading == "full":
-            model = render_full(image, camera, *size, config=config, depth=_depth(depth))
+            model = render_full(image, camera, *size, config=config)
             differs = (frame.color != model.color).any(axis=-1)
         else:
             model = render_model(image, camera, *size, config=config, background=background)

@@ -104,7 +104,8 @@ def render_rtl(image, camera, width, height, *, config, background=(0, 0, 0), la
     Returns
     -------
     Frame
-        Of a chip with a shader it has colours only. Its report has cycles, counters, busy fractions, cache hits and misses, and bytes of each memory.
+        Of a chip with a shader it has colours only. Its report has cycles, counters, busy fractions, cache hits and
+        misses, and bytes of each memory.
 
     Raises
     ------

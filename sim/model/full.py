@@ -17,7 +17,7 @@ from .model import camera_rows
 from .packet import COUNTS, SAME_ORIGIN, trace_packet
 from .shader import INSTRUCTION_FIELDS, SHADER_COUNTS, STOPPED_AT_TRACE, encoded_byte, run_ray
 
-__all__ = ["OFFSET_LOG2", "program_arrays", "render_full"]
+__all__ = ["program_arrays", "render_full"]
 
 #: Logarithm of the offset against self-intersection, in units in the last place: of −2 to 4 what draws the built-in
 #: scenes best, as a ray does not meet the triangle that it starts on. Golden, where it is next to nothing, has 3.
@@ -159,8 +159,7 @@ def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_en
                     colors[row, column, lane] = packet_colors[ray, lane]
 
 
-def render_full(image: SceneImage, camera, width, height, *, config, depth=4, features=None,
-                offset_log2=OFFSET_LOG2):
+def render_full(image: SceneImage, camera, width, height, *, config, depth=4):
     """What a chip with full shading draws, bit for bit.
 
     Parameters
@@ -172,13 +171,10 @@ def render_full(image: SceneImage, camera, width, height, *, config, depth=4, fe
     width, height : int
         Size of the picture in pixels.
     config : ChipConfig
-        The chip, of which mailbox, stack and arithmetic matter.
+        The chip, of which mailbox, stack, arithmetic, offset and shader matter; without a shader it gets the least that
+        draws all that is in the scene.
     depth : int
-        Generations of secondary rays, 0…16.
-    features : ShaderFeatures, optional
-        What the program is made of, the depth included; default is the least that draws all that is in the scene.
-    offset_log2 : int
-        Logarithm of the offset against self-intersection, in units in the last place.
+        Generations of secondary rays, 0…16, of a chip without a shader.
 
     Returns
     -------
@@ -193,7 +189,7 @@ def render_full(image: SceneImage, camera, width, height, *, config, depth=4, fe
     OverflowError
         If a packet needs more than a stack holds.
     """
-    features = features or replace(image.needs, depth=depth)
+    features = config.shader or replace(image.needs, depth=depth)
     if missing := features.missing(image.needs):
         raise ValueError(f"the shader's program lacks what the scene needs: {', '.join(missing)}")
     fmt, program = image.fmt, shader_program(features=features)
@@ -210,7 +206,7 @@ def render_full(image: SceneImage, camera, width, height, *, config, depth=4, fe
     failures = np.zeros(len(packets), np.int64)
     _render(config.arithmetic, fmt.params, image.root, image.nodes[:, 0].astype(np.int64), image.split_values(),
             image.lists.astype(np.int64), image.matrix_values(), config.mailbox_entries, config.stack_depth,
-            offset_log2, int(fmt.encode(1.0)), instructions, kinds, *image.record_lanes(), image.texels, linear, dark,
+            config.offset_log2, int(fmt.encode(1.0)), instructions, kinds, *image.record_lanes(), image.texels, linear, dark,
             bright, floats, integers, max(stack_words(features), 1), packets, x, y, width, height, colors, hits, owners,
             counts, shader_counts, failures)
     for failure, what in ((_TRIANGLE_STACK, f"the {config.stack_depth} traversal stack entries"),

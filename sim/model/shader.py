@@ -91,12 +91,14 @@ def _vector(arithmetic, params, mode, a, b, c, x, matrix, result):
 @compiled()
 def _offset(params, offset_log2, a, x):
     """Op.OFFSET: 2^(e − frac_width + offset_log2)."""
-    drop, min_normal, _ = params
+    drop, min_normal, largest = params
     most = 0.0
     for lane in range(3):
         most = max(most, abs(a[lane]), abs(x[lane]))
-    if not 0.0 < most < math.inf:
-        return most
+    if most == 0.0:
+        return 0.0
+    # Infinity has the exponent that follows the largest number's.
+    most = min(most, 2.0 * largest)
     result = math.ldexp(1.0, math.frexp(most)[1] - 1 - (52 - drop) + offset_log2)
     return result if result >= min_normal else 0.0
 

@@ -205,8 +205,8 @@ def test_singular_instance(tmp_path):
     (["--wave", "x.vcd", "--wave-pixel", "600,3"], r"--wave-pixel: 600,3 is outside of the picture of 512x384"),
     (["--view", "3"], r"--view: there is no camera 3, the scene has"),
     (["--frames", "4"], r"nothing moves in this scene; leave --frames out"),
-    (["--shading", "full", "--hits", "h.npz"], r"--hits: a chip with full shading keeps no hits; use --engine model, or "
-     r"--shading simple with --engine rtl"),
+    (["--shading", "full", "--hits", "h.npz"], r"--hits: a chip with full shading keeps no hits; use --engine model, "
+     r"or --shading simple with --engine rtl"),
     (["--shading", "full", "--engine", "pysim", "--hits", "h.npz"], r"--shading simple with --engine pysim"),
     (["--shading", "phong"], r"'phong' is not one of 'simple', 'full'"),
     (["--depth", "2"], r"--depth is of full shading; use --shading full"),

@@ -185,7 +185,7 @@ def test_a_shader_that_lacks_something_says_so():
     scene = SCENES["glass ball"]
     image = CompiledScene(scene, fmt=FORMAT).image(scene, eye=EYE.eye)
     with pytest.raises(ValueError, match=r"lacks what the scene needs: refraction, sky$"):
-        render_full(image, EYE, *SIZE, config=ChipConfig(), features=replace(image.needs, refraction=False, sky=False))
+        render_full(image, EYE, *SIZE, config=ChipConfig(shader=replace(image.needs, refraction=False, sky=False)))
 
 
 @pytest.mark.parametrize("arithmetic", range(6))
