@@ -26,6 +26,12 @@ TESTS = [f"tests/{name}.py" for name in (
     "fpu/test_pipeline", "fpu/test_chain", "formal/test_comparator", "formal/test_arithmetic", "fpu/test_format",
     "fpu/test_delay", "fpu/test_rom", "fpu/test_operations", "fpu/test_convert", "fpu/test_datapath",
     "formal/test_pipeline", "fpu/test_dot_product", "fpu/test_unary", "fpu/test_operators", "fpu/test_gates")]
+#: Of some files of operators, the tests that are most about them, which go before all others.
+NEAREST = {f"fpu/{file}.py": f"tests/fpu/{test}.py" for file, test in {
+    "convert": "test_convert", "delay": "test_delay", "dot_product": "test_dot_product", "kernel": "test_datapath",
+    "graph": "test_datapath", "circuit": "test_datapath", "rom": "test_rom", "table": "test_unary",
+    "reciprocal": "test_unary", "reciprocal_square_root": "test_unary", "square_root": "test_unary",
+    "rounding": "test_operations", "format": "test_format"}.items()}
 _SECONDS = 1800
 
 
@@ -33,11 +39,12 @@ class Broken(Exception):
     """The tests could not be collected: what was planted is no fault of arithmetic."""
 
 
-def run_tests(folder):
-    """Name of the first test that fails in a copy of the tree, or None."""
+def run_tests(folder, nearest=None):
+    """Name of the first test that fails in a copy of the tree, or None; ``nearest`` are run before the others."""
+    tests = [nearest, *(test for test in TESTS if test != nearest)] if nearest else TESTS
     environment = {**os.environ, "PYTHONPATH": str(folder), "DYNRT_CACHE": str(folder / "cache")}
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-n0", "-p", "no:cacheprovider",
-               "--basetemp", str(folder / "temporary"), *TESTS]
+               "--basetemp", str(folder / "temporary"), *tests]
     try:
         result = subprocess.run(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                 stderr=subprocess.STDOUT, text=True, errors="replace", timeout=_SECONDS)
@@ -71,7 +78,7 @@ def killed_by(fault, tree):
             if text.count(fault.snippet) != 1:
                 raise Broken(f"{fault.file} has {text.count(fault.snippet)} times: {fault.snippet!r}")
             path.write_text(text.replace(fault.snippet, fault.replacement))
-        return run_tests(folder)
+        return run_tests(folder, nearest=NEAREST.get(fault.file) if fault else None)
 
 
 @click.command()

@@ -108,6 +108,17 @@ _BY_FILE = {
         ("    if math.isnan(x):\n        return 0.0\n", "    if math.isnan(x):\n        return -0.0\n",
          "emulated ∞ - ∞ is -0"),
     ],
+    "fpu/dot_product.py": [
+        ('Mux(getattr(s, f"zero{index}"), 0, getattr(s, f"exp{index}"))', 'getattr(s, f"exp{index}")',
+         "a zero's exponent may be the highest"),
+        ("far = distance[len(levels):].any()", "far = Const(0, 1)", "what is far away comes back"),
+        ('"inf": plus_inf ^ minus_inf', '"inf": plus_inf | minus_inf', "∞ - ∞ is infinite"),
+        ("exp.eq(s.highest + (3 - fmt.bias))", "exp.eq(s.highest + (4 - fmt.bias))", "the exponent is one too high"),
+        ("(ChainBit.CARRY, x_sign ^ y_sign, 0, 0)", "(ChainBit.CARRY, x_sign, 0, 0)",
+         "a difference of a pair is off by one"),
+        ("ChainBit.ADD, Const(0, width), s.total, negative", "ChainBit.ADD, Const(0, width), s.total, 0",
+         "a negative sum is not negated"),
+    ],
     "fpu/multiplier.py": [
         ("Cat(s.exp_sum[:above], s.exp_sum[above:] - 1)", "Cat(s.exp_sum[:above], s.exp_sum[above:])",
          "the bias is not taken from the exponents' sum"),
