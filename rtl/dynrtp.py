@@ -179,7 +179,8 @@ class DynRTP(wiring.Component):
             mailbox_entries=config.mailbox_entries, solid=has_shader, **widths)
         m.submodules.transformation = transformation = Transformation(
             **computing, coord_width=config.coord_width, tag=tag, solid=has_shader, **widths)
-        m.submodules.intersection = intersection = Intersection(**computing, limited=has_shader, **widths)
+        m.submodules.intersection = intersection = Intersection(
+            **computing, limited=has_shader, near=has_shader and config.shader.passes, **widths)
 
         exhausted = self._trace(m, caches, stack, traversal, mailboxed_list, transformation, intersection)
         m.d.comb += [

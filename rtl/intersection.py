@@ -12,13 +12,13 @@ from .layout import PACKET_RAYS, thread_width, token_layout, vector_layout, with
 __all__ = ["Intersection", "hit_layout", "limits_layout", "unit_triangle"]
 
 
-def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], limited=False):
+def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False):
     """t = −O′z / D′z, u = O′x + t·D′x, v = O′y + t·D′y; ``hit`` if 0 < t < ∞, u ≥ 0, v ≥ 0 and u + v ≤ 1.
 
-    ``nearer`` if t < t_hit, which comes in just in time, as late as t is known (paper §2.1.2). For rays that are
-    ``limited`` it is t_near < t instead of 0 < t.
+    ``nearer`` if t < t_hit, which comes in just in time, as late as t is known (paper §2.1.2). With ``near``
+    it is t_near < t instead of 0 < t.
 
-    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator, and one more if limited.
+    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator.
     """
     dp = Datapath(fmt, latencies=latencies, **arithmetic.parameters)
     origin, direction = dp.vector("origin"), dp.vector("direction")
@@ -26,7 +26,7 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], limited=Fal
     t_hit = dp.input("t_hit", delay=dp.arrival(t))
     u = dp.add(origin.x, dp.mul(t, direction.x))
     v = dp.add(origin.y, dp.mul(t, direction.y))
-    if limited:
+    if near:
         ahead = dp.logical_and(dp.is_finite(t), dp.lt(dp.input("t_near", delay=dp.arrival(t)), t))
     else:
         ahead = dp.logical_and(dp.is_finite(t), dp.logical_not(dp.sign(t)), dp.logical_not(dp.is_zero(t)))
@@ -74,6 +74,8 @@ class Intersection(wiring.Component):
         How it computes.
     limited : bool
         Whether rays have limits.
+    near : bool
+        Whether t_near is one of them; if not, it counts as 0.
 
     Members
     -------
@@ -89,8 +91,9 @@ class Intersection(wiring.Component):
     """
 
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None,
-                 arithmetic=ARITHMETICS[0], limited=False):
+                 arithmetic=ARITHMETICS[0], limited=False, near=False):
         self._fmt = fmt
+        self._near = near
         self._limited = limited
         self._latencies = latencies
         self._arithmetic = arithmetic
@@ -119,7 +122,7 @@ class Intersection(wiring.Component):
         m = Module()
         num_slots = 1 << thread_width(self._num_threads)
         graph = unit_triangle(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic,
-                              limited=self._limited)
+                              near=self._near)
         m.submodules.test = test = graph.component()
 
         vector = self.vector.payload
@@ -255,9 +258,10 @@ class Intersection(wiring.Component):
             instance_read.addr.eq(asking.token.thread),
             asked.i.triangle.eq(asking.index),
             asked.i.instance.eq(Mux(asking.token.level, instance_read.data, ~0)),
-            test.t_near.eq(limit.t_near),
         ]
         m.d.sync += limit.eq(read.data)
+        if self._near:
+            m.d.comb += test.t_near.eq(limit.t_near)
         m.submodules.verdict = verdict = Delay(data.StructLayout({"excluded": 1, "any_hit": 1}), cycles=cycles - 2)
         m.d.comb += [
             verdict.i.excluded.eq((limit.triangle == asked.o.triangle) & (limit.instance == asked.o.instance)),

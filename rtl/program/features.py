@@ -79,6 +79,11 @@ class ShaderFeatures:
         return self.refraction or self.transparency
 
     @property
+    def passes(self):
+        """Whether rays go on beyond what they have hit, from a t_near that is not 0."""
+        return self.transparency or (self.shadows and self.clear)
+
+    @property
     def children(self):
         """Whether there are secondary rays."""
         return self.depth > 0 and (self.shares or self.transparency)

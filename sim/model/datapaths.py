@@ -24,8 +24,8 @@ _map_fused, _map_narrow = _kernel(transformation.affine_map, _FUSED), _kernel(tr
 _step_divided, _step_truncated = _kernel(traversal.kd_step), _kernel(traversal.kd_step, _TRUNCATED)
 _step_multiplied = _kernel(traversal.kd_step, _RECIPROCAL)
 # With t_near = 0 that of limited rays is the same as that of others.
-_triangle_nearest = _kernel(intersection.unit_triangle, limited=True)
-_triangle_truncated = _kernel(intersection.unit_triangle, _TRUNCATED, limited=True)
+_triangle_nearest = _kernel(intersection.unit_triangle, near=True)
+_triangle_truncated = _kernel(intersection.unit_triangle, _TRUNCATED, near=True)
 
 
 # Where an arithmetic does not differ in its results it takes the first one's kernel: a quotient by table is the same.

@@ -206,9 +206,9 @@ def render_full(image: SceneImage, camera, width, height, *, config, depth=4):
     failures = np.zeros(len(packets), np.int64)
     _render(config.arithmetic, fmt.params, image.root, image.nodes[:, 0].astype(np.int64), image.split_values(),
             image.lists.astype(np.int64), image.matrix_values(), config.mailbox_entries, config.stack_depth,
-            config.offset_log2, int(fmt.encode(1.0)), instructions, kinds, *image.record_lanes(), image.texels, linear, dark,
-            bright, floats, integers, max(stack_words(features), 1), packets, x, y, width, height, colors, hits, owners,
-            counts, shader_counts, failures)
+            config.offset_log2, int(fmt.encode(1.0)), instructions, kinds, *image.record_lanes(), image.texels,
+            linear, dark, bright, floats, integers, max(stack_words(features), 1), packets, x, y, width, height,
+            colors, hits, owners, counts, shader_counts, failures)
     for failure, what in ((_TRIANGLE_STACK, f"the {config.stack_depth} traversal stack entries"),
                           (_SHADER_STACK, f"the {stack_words(features)} registers of a ray's stack")):
         if (failures == failure).any():
