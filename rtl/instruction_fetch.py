@@ -4,7 +4,7 @@ from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from .layout import PACKET_RAYS, camera_layout, thread_width
+from .layout import PACKET_RAYS, camera_layout, thread_slots, thread_width
 from .microcode import Lane, counter_width, instruction_layout
 from .queue import Queue
 from .register_file import RegisterFile, lanes_layout
@@ -41,6 +41,8 @@ class InstructionFetch(wiring.Component):
         What rays do.
     stack_depth : int
         Registers on a ray's stack.
+    bank_bits : int
+        See :class:`~rtl.register_file.RegisterFile`.
 
     Members
     -------
@@ -55,13 +57,14 @@ class InstructionFetch(wiring.Component):
     #: Instructions that can be under way.
     capacity = 6
 
-    def __init__(self, *, fmt, num_threads, program, stack_depth):
+    def __init__(self, *, fmt, num_threads, program, stack_depth, bank_bits=0):
         self._fmt = fmt
         self._program = program
-        self._num_rays = PACKET_RAYS << thread_width(num_threads)
+        self._num_rays = PACKET_RAYS * thread_slots(num_threads, bank_bits)
         self._token = token = ray_token_layout(num_threads=num_threads, program=program, stack_depth=stack_depth)
         self._instruction = instruction = instruction_layout(len(program.instructions))
-        self._registers = RegisterFile(fmt=fmt, num_threads=num_threads, literals=program.literals)
+        self._registers = RegisterFile(fmt=fmt, num_threads=num_threads, literals=program.literals,
+                                       bank_bits=bank_bits)
         lanes = lanes_layout(fmt)
         self._out = data.StructLayout({"valid": 1, "token": token, "instruction": instruction,
                                        **{name: lanes for name in "abcx"}})
