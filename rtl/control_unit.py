@@ -1,6 +1,6 @@
 """Where a ray goes on in its program, its stack, and its last hit."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal
+from amaranth.hdl import Assert, Cat, Const, Module, Mux, Signal
 from amaranth.lib import data, memory, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import ceil_log2
@@ -159,6 +159,10 @@ class ControlUnit(wiring.Component):
             write.en.eq(self.i.valid & (op == Op.PUSH)),
             read.addr.eq(Cat((token.sp - 1)[:entry_bits], token.ray, token.thread[self._bank_bits:])),
         ]
-        m.d.sync += popped.eq(read.data)
+        m.d.sync += [
+            popped.eq(read.data),
+            Assert(~write.en | (token.sp < self._stack_depth), "a ray's stack overflows"),
+            Assert(~self.i.valid | (op != Op.POP) | (token.sp != 0), "a ray takes from an empty stack"),
+        ]
         with m.If(last.op == Op.POP):
             m.d.comb += self.o.result.value.eq(popped)
