@@ -14,7 +14,7 @@ from tests.rtl.test_register_file import LITERALS, constants_of, random_camera
 
 FMT = FloatFormat(5, 8)
 STACK_DEPTH = 3
-#: From the cycle in which an instruction is taken up to that in which it is out, if it reads two registers.
+#: From the cycle in which an instruction is taken up to that in which it is out, if it is not wide.
 LATENCY = 5
 
 
@@ -23,30 +23,28 @@ def random_program(rng, length):
         return rng.choice([rng.randrange(6), NUM_REGISTERS + rng.randrange(5 + len(LITERALS))])
 
     return Program(tuple({
-        "op": rng.choice([*Op, *[Op.VECTOR] * 10]), "mode": rng.choice(list(Mode)),
+        "op": rng.choice(list(Op)), "mode": rng.choice(list(Mode)),
         "condition": rng.choice(list(Condition)), "store": rng.choice(list(Store)), "bit": rng.randrange(32),
         "mask": rng.randrange(8), "dst": rng.randrange(NUM_REGISTERS), "a": register(), "b": register(),
         "c": register(), "x": register(), "select": [rng.choice(list(Lane)).value for _ in range(3)],
-        "negate": rng.randrange(8), "target": rng.randrange(length)} for _ in range(length)), LITERALS)
-
-
-def reads_four(instruction):
-    return instruction["op"] is Op.VECTOR and instruction["mode"] is not Mode.DIAGONAL
+        "negate": rng.randrange(8), "target": rng.randrange(length),
+        "is_wide": int(counter % 3 == 0)} for counter in range(length)), LITERALS)
 
 
 class Rays:
     """Rays, each with a random instruction under way or none, their registers, and what is to come out, in order."""
 
-    def __init__(self, rng, *, num_threads):
+    def __init__(self, rng, *, num_threads, bank=0, bank_bits=0):
         self.rng = rng
+        threads = range(bank, num_threads, 1 << bank_bits)
         self.program = random_program(rng, 40)
         self.camera = random_camera(rng)
         self.constants = constants_of(FMT, self.camera)
-        self.registers = {(thread, ray, number): [0] * 3 for thread in range(num_threads)
+        self.registers = {(thread, ray, number): [0] * 3 for thread in threads
                           for ray in range(PACKET_RAYS) for number in range(NUM_REGISTERS)}
-        self.idle = [(thread, ray) for thread in range(num_threads) for ray in range(PACKET_RAYS)]
+        self.idle = [(thread, ray) for thread in threads for ray in range(PACKET_RAYS)]
         self.expected = deque()
-        self.num_done = self.num_fours = 0
+        self.num_done = self.num_wide = 0
 
     def read(self, thread, ray, number):
         return self.constants[number - NUM_REGISTERS] if number >= NUM_REGISTERS else \
@@ -63,8 +61,8 @@ class Rays:
         source = [*operands["x"], 0, int(FMT.encode(1.0))]
         operands["x"] = [source[choice] ^ (instruction["negate"] >> lane & 1) << FMT.width - 1
                          for lane, choice in enumerate(instruction["select"])]
-        if not reads_four(instruction):
-            del operands["b"], operands["c"]
+        if not instruction["is_wide"]:
+            operands["b"] = operands["c"] = [0] * 3
         self.expected.append((token, instruction, operands))
         return token
 
@@ -72,12 +70,12 @@ class Rays:
         token, instruction, operands = self.expected.popleft()
         assert {name: out.token[name] for name in token} == token
         assert out.instruction.op == instruction["op"]
-        for name in ("bit", "mask", "dst", "negate", "target", "store", "condition", "mode"):
+        for name in ("bit", "mask", "dst", "negate", "target", "store", "condition", "mode", "is_wide"):
             assert out.instruction[name] == instruction[name]
         for name, lanes in operands.items():
             assert list(out[name]) == lanes, name
         self.num_done += 1
-        self.num_fours += reads_four(instruction)
+        self.num_wide += instruction["is_wide"]
         self.idle.append((token["thread"], token["ray"]))
 
 
@@ -86,16 +84,18 @@ def set_camera(ctx, dut, camera):
                          "origin": dict(zip("xyz", camera[3], strict=True))})
 
 
-def build(rays, *, num_threads):
-    return InstructionFetch(fmt=FMT, num_threads=num_threads, program=rays.program, stack_depth=STACK_DEPTH)
+def build(rays, *, num_threads, bank_bits=0):
+    return InstructionFetch(fmt=FMT, num_threads=num_threads, program=rays.program, stack_depth=STACK_DEPTH,
+                            bank_bits=bank_bits)
 
 
-@pytest.mark.parametrize(("seed", "num_threads", "gap", "pause"), [
-    (0, 1, 0.0, 0.0), (1, 3, 0.0, 0.3), (2, 8, 0.5, 0.0), (3, 8, 0.0, 0.8), (4, 2, 0.2, 0.1)])
-def test_rays_in_turn(seed, num_threads, gap, pause):
+@pytest.mark.parametrize(("seed", "num_threads", "gap", "pause", "bank_bits"), [
+    (0, 1, 0.0, 0.0, 0), (1, 3, 0.0, 0.3, 0), (2, 8, 0.5, 0.0, 1), (3, 8, 0.0, 0.8, 2), (4, 2, 0.2, 0.1, 1)])
+def test_rays_in_turn(seed, num_threads, gap, pause, bank_bits):
     rng = random.Random(seed)
-    rays = Rays(rng, num_threads=num_threads)
-    dut = build(rays, num_threads=num_threads)
+    bank = rng.randrange(1 << bank_bits)
+    rays = Rays(rng, num_threads=num_threads, bank=bank, bank_bits=bank_bits)
+    dut = build(rays, num_threads=num_threads, bank_bits=bank_bits)
     write, ray = Packed(dut.write.shape()), Packed(dut.ray.payload.shape())
 
     async def work(ctx):
@@ -131,7 +131,8 @@ def test_rays_in_turn(seed, num_threads, gap, pause):
             assert under_way <= dut.capacity
 
     simulate(dut, work, name="instruction_fetch", background=(watch(dut.out, rays.check), admit, count))
-    assert rays.num_fours > 60
+    assert rays.num_wide > 60
+    assert rays.num_done - rays.num_wide > 60
 
 
 def test_an_instruction_a_clock_or_in_two():
@@ -166,10 +167,10 @@ def test_an_instruction_a_clock_or_in_two():
              background=(log, watch(dut.out, rays.check)))
     expected, now = [], LATENCY - 1
     for token in tokens:
-        now += 1 + reads_four(rays.program.instructions[token["counter"]])
+        now += 1 + rays.program.instructions[token["counter"]]["is_wide"]
         expected.append(now)
     assert out_at == expected
-    assert 0 < rays.num_fours < len(tokens)
+    assert 0 < rays.num_wide < len(tokens)
 
 
 def test_nothing_more_is_taken_up_once_it_is_not_admitted():

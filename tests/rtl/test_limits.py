@@ -25,7 +25,8 @@ NUM_TRIANGLES = 3
 class World:
     """Rays with limits, the packets in triangles' spaces that they are tested in, and what they are to have hit."""
 
-    def __init__(self, *, seed, num_threads, num_packets):
+    def __init__(self, *, seed, num_threads, num_packets, near):
+        self.near = near
         self.rng = random.Random(seed)
         self.arithmetic = Rounded(FMT)
         self.num_packets = num_packets
@@ -87,7 +88,7 @@ class World:
         kept = records.get(ray, {}).get("t", math.inf)
         if not (u >= 0 and v >= 0 and self.arithmetic.add(u, v) <= 1 and t < math.inf):
             events["beside"] += 1
-        elif not limits["t_near"] < t:
+        elif not (limits["t_near"] if self.near else 0) < t:
             events["too near" if t > 0 else "behind"] += 1
             events["just too near"] += t == limits["t_near"] > 0
         elif (index, instance) == (limits["triangle"], limits["instance"]):
@@ -103,12 +104,13 @@ class World:
                             "in_instance": level, "instance": instance if level else None}
 
 
-@pytest.mark.parametrize(("seed", "num_threads", "gap"), [(0, 1, 0.0), (1, 6, 0.3), (2, 12, 0.0)])
-def test_limits(seed, num_threads, gap):
-    world = World(seed=seed, num_threads=num_threads, num_packets=90)
+@pytest.mark.parametrize(("seed", "num_threads", "gap", "near"), [
+    (0, 1, 0.0, True), (1, 6, 0.3, True), (2, 12, 0.0, True), (3, 8, 0.0, False)])
+def test_limits(seed, num_threads, gap, near):
+    world = World(seed=seed, num_threads=num_threads, num_packets=90, near=near)
     rng = world.rng
     dut = Intersection(fmt=FMT, num_threads=num_threads, stack_depth=STACK_DEPTH, index_width=INDEX_WIDTH,
-                       latencies=LATENCIES, limited=True)
+                       latencies=LATENCIES, limited=True, near=near, num_readers=2)
     tested = deque()
     accepted = Counter()
     idle, beginning = set(range(num_threads)), set()
@@ -146,9 +148,10 @@ def test_limits(seed, num_threads, gap):
             assert fields(token) == world.expected[thread]
             ctx.set(dut.hit_address, thread)
             for ray, record in world.records[thread].items():
-                ctx.set(dut.record_address, {"thread": thread, "ray": ray})
+                reader = rng.randrange(2)
+                ctx.set(dut.record_address[reader], {"thread": thread, "ray": ray})
                 await ctx.tick().repeat(2)
-                got = ctx.get(dut.record)
+                got = ctx.get(dut.record[reader])
                 assert same(ctx.get(dut.hit_distances[ray]), record["t"])
                 for name, expected in record.items():
                     if expected is not None:
@@ -165,7 +168,8 @@ def test_limits(seed, num_threads, gap):
     for event in ("beside", "behind", "too near", "just too near", "excluded", "excluded inside of an instance",
                   "excluded but for its instance", "over", "as far", "too far", "beyond t_far", "is over",
                   "passes through", "closest"):
-        assert events[event] > 2, event
+        assert events[event] > 2 or "near" in event, event
+    assert min(events["too near"], events["just too near"]) > 2 if near else not events["too near"]
     assert num_records[0] > 200
 
 

@@ -29,17 +29,18 @@ def random_camera(rng):
 
 
 @pytest.mark.parametrize("fmt", [NARROW, WIDEST], ids=str)
-@pytest.mark.parametrize(("seed", "num_threads"), [(0, 1), (1, 3)])
-def test_reads_what_was_written(fmt, seed, num_threads):
+@pytest.mark.parametrize(("seed", "num_threads", "bank_bits"), [(0, 1, 0), (1, 3, 0), (2, 8, 2)])
+def test_reads_what_was_written(fmt, seed, num_threads, bank_bits):
     rng = random.Random(seed)
-    dut = RegisterFile(fmt=fmt, num_threads=num_threads, literals=LITERALS)
+    dut = RegisterFile(fmt=fmt, num_threads=num_threads, literals=LITERALS, bank_bits=bank_bits)
+    threads = range(rng.randrange(1 << bank_bits), num_threads, 1 << bank_bits)
     camera = random_camera(rng)
     constants = constants_of(fmt, camera)
     registers = {}
     num_checked = {"register": 0, "constant": 0, "part of a register": 0}
 
     def place():
-        return rng.randrange(num_threads), rng.randrange(PACKET_RAYS), rng.choice([0, 1, 5, NUM_REGISTERS - 1])
+        return rng.choice(threads), rng.randrange(PACKET_RAYS), rng.choice([0, 1, 5, NUM_REGISTERS - 1])
 
     async def work(ctx):
         ctx.set(dut.camera, {"rows": [dict(zip("xyz", row, strict=True)) for row in camera[:3]],

@@ -22,7 +22,7 @@ ANY_HIT, HAS_FAR, SAME_ORIGIN = 1, 2, 4
 class Packets:
     """Packets of all threads: which of their rays run, which have stopped how, and which are to come back."""
 
-    def __init__(self, rng, *, num_threads, num_packets):
+    def __init__(self, rng, *, num_threads, threads, num_packets):
         self.rng = rng
         self.num_packets = num_packets
         self.begins, self.stops, self.packets = deque(), deque(), deque()
@@ -37,7 +37,7 @@ class Packets:
         self.tracing = []
         self.limits, self.colors = deque(), deque()
         self.events = Counter()
-        for thread in range(num_threads):
+        for thread in threads:
             self.begin(thread)
 
     def begin(self, thread):
@@ -111,13 +111,14 @@ class Packets:
         self.events["came back"] += 1
 
 
-@pytest.mark.parametrize(("seed", "num_threads", "gap", "pace"), [
-    (0, 1, 0.0, 1.0), (1, 5, 0.0, 1.0), (2, 8, 0.6, 0.5), (3, 16, 0.2, 1.0)])
-def test_rays_wait_for_each_other(seed, num_threads, gap, pace):
+@pytest.mark.parametrize(("seed", "num_threads", "gap", "pace", "bank_bits"), [
+    (0, 1, 0.0, 1.0, 0), (1, 5, 0.0, 1.0, 0), (2, 16, 0.6, 0.5, 1), (3, 16, 0.2, 1.0, 0), (4, 2, 0.3, 1.0, 1)])
+def test_rays_wait_for_each_other(seed, num_threads, gap, pace, bank_bits):
     rng = random.Random(seed)
     dut = Rendezvous(fmt=FMT, num_threads=num_threads, stack_depth=STACK_DEPTH, index_width=INDEX_WIDTH,
-                     program=PROGRAM, ray_stack_depth=RAY_STACK_DEPTH)
-    packets = Packets(rng, num_threads=num_threads, num_packets=NUM_PACKETS)
+                     program=PROGRAM, ray_stack_depth=RAY_STACK_DEPTH, bank_bits=bank_bits)
+    threads = range(rng.randrange(1 << bank_bits), num_threads, 1 << bank_bits)
+    packets = Packets(rng, num_threads=num_threads, threads=threads, num_packets=NUM_PACKETS)
     read = Packed(dut.stop.payload.shape())
 
     def took_limit(limit):

@@ -1,4 +1,4 @@
-"""The shader running random programs, against an interpreter a ray at a time.
+"""Shaders running random programs, against an interpreter a ray at a time.
 
 The units around it are the test's: a transformation that multiplies, caches and textures that answer with functions of
 what they are asked, traversal that hits what the ray's number says. All of them take their time.
@@ -14,7 +14,7 @@ from fpu import FloatFormat
 from rtl.layout import IntervalSource
 from rtl.microcode import NO_TRIANGLE, lane_width
 from rtl.rendezvous import TraceFlag
-from rtl.shader import Shader
+from rtl.shaders import Shaders
 from tests.bench import Packed, drain, feed, memory, simulate, watch
 from tests.rtl.colors import encoded_byte
 from tests.rtl.packets import fields, random_token, rays_of
@@ -195,14 +195,15 @@ class World:
         self.events["gray"] += len(set(shown)) == 1
 
 
-@pytest.mark.parametrize(("seed", "block", "num_threads", "gap", "latency"), [
-    (0, 6, 1, 0.0, 4), (1, 8, 4, 0.3, 30), (2, 8, 8, 0.0, 3), (3, 12, 5, 0.7, 12), (4, 4, 8, 0.0, 90)])
-def test_random_programs(seed, block, num_threads, gap, latency):
+@pytest.mark.parametrize(("seed", "block", "num_threads", "gap", "latency", "num_shaders"), [
+    (0, 6, 1, 0.0, 4, 1), (1, 8, 4, 0.3, 30, 1), (2, 8, 8, 0.0, 3, 2), (3, 12, 5, 0.7, 12, 1), (4, 4, 8, 0.0, 90, 4)])
+def test_random_programs(seed, block, num_threads, gap, latency, num_shaders):
     num_packets = max(5, num_threads + 2)
     world = World(seed=seed, block=block, num_threads=num_threads, num_packets=num_packets, latency=latency)
     rng = random.Random(100 + seed)
-    dut = Shader(fmt=FMT, num_threads=num_threads, stack_depth=TRAVERSAL_DEPTH, index_width=INDEX_WIDTH,
-                 coord_width=COORD_WIDTH, program=world.program, ray_stack_depth=STACK_DEPTH, offset_log2=3)
+    dut = Shaders(fmt=FMT, num_threads=num_threads, stack_depth=TRAVERSAL_DEPTH, index_width=INDEX_WIDTH,
+                  coord_width=COORD_WIDTH, program=world.program, ray_stack_depth=STACK_DEPTH, offset_log2=3,
+                  num_shaders=num_shaders)
 
     stepped = Packed(dut.stepped.shape())
 
@@ -221,11 +222,13 @@ def test_random_programs(seed, block, num_threads, gap, latency):
                 break
         await ctx.tick().repeat(50)
 
-    async def position(ctx):
-        while True:
-            x, y = world.places.get(ctx.get(dut.position_address), (0, 0))
-            ctx.set(dut.position, {"x": x, "y": y})
-            await ctx.changed(dut.position_address)
+    def position(number):
+        async def testbench(ctx):
+            while True:
+                x, y = world.places.get(ctx.get(dut.position_address[number]), (0, 0))
+                ctx.set(dut.position[number], {"x": x, "y": y})
+                await ctx.changed(dut.position_address[number])
+        return testbench
 
     async def never_idle_with_pixels(ctx):
         async for _, _, valid, idle in ctx.tick().sample(dut.pixel.valid, dut.idle):
@@ -238,9 +241,10 @@ def test_random_programs(seed, block, num_threads, gap, latency):
 
     slow = dict(rng=rng, gap=gap)
     simulate(dut, work, name="shader", ticks=60_000, background=(
-        position, never_idle_with_pixels, log_packets,
+        *map(position, range(num_shaders)), never_idle_with_pixels, log_packets,
         watch(dut.shared, lambda shared: world.shared.update({shared.thread: shared.shared})),
-        memory(dut.record_address, dut.record, lambda at: world.records.get((at.thread, at.ray), {})),
+        *(memory(address, record, lambda at: world.records.get((at.thread, at.ray), {}))
+          for address, record in zip(dut.record_address, dut.record, strict=True)),
         drain(dut.step, world.step, **slow), drain(dut.load, world.load, **slow),
         drain(dut.texture, world.texel, **slow), drain(dut.limit, world.limit, **slow),
         drain(dut.pixel, world.pixel, **slow), drain(dut.start, world.start), drain(dut.finished, world.finished),

@@ -28,7 +28,7 @@ SMALL = replace(ChipConfig(), num_threads=1, node_lines=32, list_lines=16, matri
                 shading_lines=8, texture_lines=8, mailbox_entries=1, shader=EVERYTHING)
 CHIPS = {
     "a thread": SMALL,
-    "two pipelines": replace(SMALL, num_threads=7, num_pipelines=2),
+    "two pipelines": replace(SMALL, num_threads=7, num_pipelines=2, num_shaders=2),
     "mirrors and shadows": replace(SMALL, num_threads=4, shader=MIRRORS),
 }
 EYE = Camera((3.0, -5.0, 3.0), (0.0, 0.0, 0.5), (0.0, 0.0, 1.0), 50.0)
