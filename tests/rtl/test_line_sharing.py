@@ -6,7 +6,7 @@ from collections import deque
 import pytest
 
 from rtl.line_sharing import LineSharing
-from tests.bench import drain, feed, simulate, until
+from tests.bench import drain, feed, simulate, steady, until
 
 LINE_WIDTH = 6
 
@@ -68,7 +68,8 @@ def test_words_come_back_to_whoever_asked(seed, num_users, num_fetches, line_wor
 
     clock = [0]
     simulate(dut, until(lambda: not any((*left, *expected)), quiet=20), name="line_sharing", background=(
-        answer, ask, drain(dut.line_request, lambda line: owed.append((clock[0] + latency, line)), rng=rng, gap=gap),
+        answer, ask, steady(dut.line_request),
+        drain(dut.line_request, lambda line: owed.append((clock[0] + latency, line)), rng=rng, gap=gap),
         *(feed(port, queue, rng=rng, gap=gap) for port, queue in zip(dut.request, requests, strict=True)),
         *(drain(port, receive(user)) for user, port in enumerate(dut.data))))
     assert not owed

@@ -15,7 +15,7 @@ from rtl.layout import IntervalSource
 from rtl.microcode import NO_TRIANGLE, lane_width
 from rtl.rendezvous import TraceFlag
 from rtl.shaders import Shaders
-from tests.bench import Packed, drain, feed, memory, simulate, watch
+from tests.bench import Packed, drain, feed, memory, simulate, steady, watch
 from tests.rtl.colors import encoded_byte
 from tests.rtl.packets import fields, random_token, rays_of
 from tests.rtl.shader_rays import NUM_GENERATIONS, STACK_DEPTH, Interpreter, product, random_program
@@ -196,7 +196,7 @@ class World:
 
 
 @pytest.mark.parametrize(("seed", "block", "num_threads", "gap", "latency", "num_shaders"), [
-    (0, 6, 1, 0.0, 4, 1), (1, 8, 4, 0.3, 30, 1), (2, 8, 8, 0.0, 3, 2), (3, 12, 5, 0.7, 12, 1), (4, 4, 8, 0.0, 90, 4)])
+    (0, 6, 1, 0.0, 4, 1), (1, 8, 4, 0.3, 30, 1), (2, 8, 8, 0.2, 3, 2), (3, 12, 5, 0.7, 12, 1), (4, 4, 8, 0.0, 90, 4)])
 def test_random_programs(seed, block, num_threads, gap, latency, num_shaders):
     num_packets = max(5, num_threads + 2)
     world = World(seed=seed, block=block, num_threads=num_threads, num_packets=num_packets, latency=latency)
@@ -241,6 +241,7 @@ def test_random_programs(seed, block, num_threads, gap, latency, num_shaders):
 
     slow = dict(rng=rng, gap=gap)
     simulate(dut, work, name="shader", ticks=60_000, background=(
+        *map(steady, (dut.step, dut.load, dut.texture, dut.limit, dut.pixel)),
         *map(position, range(num_shaders)), never_idle_with_pixels, log_packets,
         watch(dut.shared, lambda shared: world.shared.update({shared.thread: shared.shared})),
         *(memory(address, record, lambda at: world.records.get((at.thread, at.ray), {}))

@@ -69,13 +69,15 @@ def assert_equal(scene, *, config, size, flatten=None, camera=None, **memory):
     report = frame.report
     assert report["packets"] == -(-size[0] // 2) * -(-size[1] // 2)
     assert report["traces"] == model.report["packets_traced"]
-    assert round(report["busy"]["shader"] * report["cycles"] * config.num_pipelines) == counts["instructions"]
+    num_shaders = config.num_pipelines * config.num_shaders
+    assert round(report["busy"]["shader"] * report["cycles"] * num_shaders) == counts["instructions"]
     looked_up = {name: sum(count.values()) for name, count in report["cache"].items()}
     assert (looked_up["nodes"], looked_up["lists"]) == (counts["steps"] + counts["leaves"], counts["entries"])
     return frame, model.report["ray_kinds"]
 
 
-@pytest.mark.parametrize(("chip", "size", "seed"), [("a thread", (12, 9), 1), ("two pipelines", (32, 23), 2)])
+@pytest.mark.parametrize(("chip", "size", "seed"), [("a thread", (12, 9), 1), ("two pipelines", (32, 23), 2),
+                                                    ("two pipelines", (32, 23), 6)])
 def test_a_mirror_room(chip, size, seed):
     frame, kinds = assert_equal(load_scene("mirror-room"), config=CHIPS[chip], size=size, jitter=20, seed=seed)
     assert len(np.unique(frame.color.reshape(-1, 3), axis=0)) > size[0] * size[1] / 3
