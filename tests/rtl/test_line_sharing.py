@@ -16,7 +16,8 @@ def word_of(line, place):
 
 
 @pytest.mark.parametrize(("seed", "num_users", "num_fetches", "line_words", "gap", "latency"), [
-    (0, 2, 1, 1, 0.0, 1), (1, 2, 4, 4, 0.5, 20), (2, 3, 2, 3, 0.0, 9), (3, 4, 4, 9, 0.2, 3)])
+    (0, 2, 1, 1, 0.0, 1), (1, 2, 4, 4, 0.5, 20), (2, 3, 2, 3, 0.0, 9), (3, 4, 4, 9, 0.2, 3),
+    (4, 4, 4, 1, 0.6, 1)])
 def test_words_come_back_to_whoever_asked(seed, num_users, num_fetches, line_words, gap, latency):
     rng = random.Random(seed)
     dut = LineSharing(num_users=num_users, num_fetches=num_fetches, line_width=LINE_WIDTH, line_words=line_words)
