@@ -8,8 +8,9 @@ from ctypes import POINTER, c_int32, c_uint32, c_uint64
 import numpy as np
 
 from rtl.dynrtc import counter_names
-from rtl.dynrtp import UNITS, memory_ports
 from rtl.layout import thread_width
+from rtl.memory_ports import memory_ports
+from rtl.observation import UNITS
 from rtl.write_out import pixel_layout
 
 from .build import chip_library
