@@ -198,19 +198,51 @@ class Scene:
         """Time of the last key frame, in seconds; 0 for a still scene."""
         return self.animation.duration if self.is_animated else 0.0
 
-    def at_time(self, t):
+    def at_time(self, t, *, move=None):
         """The same scene with instances, cameras and lights where they are at time ``t``, in seconds.
 
         Times outside the key frames take the nearest one's value. Meshes are shared, not copied.
 
+        Parameters
+        ----------
+        t : float
+        move : callable, optional
+            ``move(number, instance, t)`` is asked where each :class:`Instance` is, which it gets as the key frames have
+            it: float64[3, 4], or None for there. So still scenes move too, if they are compiled with
+            ``flatten=False``::
+
+                def swing(number, instance, t):
+                    if instance.name == "door":
+                        c, s = np.cos(t), np.sin(t)
+                        return instance.transform @ [[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+
+                posed = scene.at_time(0.5, move=swing)
+
         Raises
         ------
         SceneError
-            If a transform is singular at that time.
+            If a transform is singular at that time, or what ``move`` returns is none.
         """
-        if not self.is_animated:
-            return self
-        transforms, cameras, lights = self.animation.pose(t)
-        instances = [replace(instance, transform=transform)
-                     for instance, transform in zip(self.instances, transforms, strict=True)]
-        return replace(self, instances=instances, cameras=cameras, lights=lights or self.lights)
+        posed = self
+        if self.is_animated:
+            transforms, cameras, lights = self.animation.pose(t)
+            instances = [replace(instance, transform=transform)
+                         for instance, transform in zip(self.instances, transforms, strict=True)]
+            posed = replace(self, instances=instances, cameras=cameras, lights=lights or self.lights)
+        if move is None:
+            return posed
+        return replace(posed, instances=[_moved(number, instance, move(number, instance, t))
+                                         for number, instance in enumerate(posed.instances)])
+
+
+def _moved(number, instance, transform):
+    if transform is None:
+        return instance
+    try:
+        transform = np.array(transform, np.float64)
+        if transform.shape != (3, 4):
+            raise ValueError(f"of shape {transform.shape}")
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"node '{instance.name}' (instance {number}): what moves it must return a 3×4 matrix [A | b] "
+                         f"or None: {error}") from error
+    return replace(instance, transform=transform)
