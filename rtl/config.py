@@ -46,6 +46,8 @@ class ChipConfig:
         Pipelines behind one ray generation controller, 1…4.
     shader : :class:`~rtl.program.features.ShaderFeatures`, optional
         What the shader is able to do; without one, triangles have one colour each and no rays but the primary ones.
+    num_shaders : int
+        Shaders of each pipeline, 1, 2 or 4, each for its part of the threads.
     offset_log2 : int
         Logarithm of the shader's offset against self-intersection, in units in the last place.
     shading_lines, texture_lines, texture_line_items : int
@@ -76,6 +78,7 @@ class ChipConfig:
     arithmetic: int = 0
     num_pipelines: int = 1
     shader: ShaderFeatures | None = None
+    num_shaders: int = 1
     offset_log2: int = 1
     shading_lines: int = 128
     texture_lines: int = 256
@@ -89,6 +92,7 @@ class ChipConfig:
             "list_line_items": (1, 16), "matrix_lines": (2, 1 << 16), "num_fetches": (1, 16),
             "index_width": (8, 24), "coord_width": (4, 14),
             "arithmetic": (0, len(ARITHMETICS) - 1), "num_pipelines": (1, 4), "offset_log2": (0, 8),
+            "num_shaders": (1, 4),
             "shading_lines": (2, 1 << 16), "texture_lines": (2, 1 << 16), "texture_line_items": (1, 16),
         }
         for name, (low, high) in ranges.items():
@@ -96,7 +100,7 @@ class ChipConfig:
             if not low <= value <= high:
                 raise ValueError(f"{name} is {value}; it must be from {low} to {high}")
         for name in ("node_lines", "list_lines", "matrix_lines", "node_line_items", "list_line_items",
-                     "shading_lines", "texture_lines", "texture_line_items"):
+                     "shading_lines", "texture_lines", "texture_line_items", "num_shaders"):
             if getattr(self, name).bit_count() != 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be a power of two")
 

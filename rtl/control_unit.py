@@ -7,7 +7,7 @@ from amaranth.utils import ceil_log2
 
 from .instruction_fetch import ray_token_layout
 from .intersection import hit_layout
-from .layout import PACKET_RAYS, thread_width
+from .layout import PACKET_RAYS, thread_slots, thread_width
 from .microcode import NO_TRIANGLE, Condition, Op, instruction_layout, lane_width
 from .register_file import lanes_layout
 
@@ -27,7 +27,7 @@ class ControlUnit(wiring.Component):
 
     Parameters
     ----------
-    fmt, num_threads, program, stack_depth
+    fmt, num_threads, program, stack_depth, bank_bits
         See :class:`~rtl.instruction_fetch.InstructionFetch`.
     index_width : int
         Bits of a triangle's number.
@@ -42,10 +42,11 @@ class ControlUnit(wiring.Component):
 
     latency = 2
 
-    def __init__(self, *, fmt, num_threads, program, stack_depth, index_width):
+    def __init__(self, *, fmt, num_threads, program, stack_depth, index_width, bank_bits=0):
         self._fmt = fmt
         self._stack_depth = stack_depth
-        self._num_rays = PACKET_RAYS << thread_width(num_threads)
+        self._bank_bits = bank_bits
+        self._num_rays = PACKET_RAYS * thread_slots(num_threads, bank_bits)
         self._conditions = {line["condition"] for line in program.instructions if line["op"] is Op.BRANCH}
         self._ops = {line["op"] for line in program.instructions}
         self._lanes = lanes = lanes_layout(fmt)
@@ -153,10 +154,10 @@ class ControlUnit(wiring.Component):
         read, write = stack.read_port(), stack.write_port()
         popped = Signal(self._lanes, reset_less=True)
         m.d.comb += [
-            write.addr.eq(Cat(token.sp[:entry_bits], token.ray, token.thread)),
+            write.addr.eq(Cat(token.sp[:entry_bits], token.ray, token.thread[self._bank_bits:])),
             write.data.eq(self.i.a),
             write.en.eq(self.i.valid & (op == Op.PUSH)),
-            read.addr.eq(Cat((token.sp - 1)[:entry_bits], token.ray, token.thread)),
+            read.addr.eq(Cat((token.sp - 1)[:entry_bits], token.ray, token.thread[self._bank_bits:])),
         ]
         m.d.sync += popped.eq(read.data)
         with m.If(last.op == Op.POP):

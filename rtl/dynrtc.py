@@ -124,7 +124,8 @@ class DynRTC(wiring.Component):
         return self.config.num_fetches
 
     def _count(self, m):
-        m.submodules.counters = counters = Counters(self._names, num_sources=len(self._pipelines))
+        m.submodules.counters = counters = Counters(
+            self._names, num_sources=len(self._pipelines) * self.config.num_shaders)
         m.d.comb += [counters.clear.eq(self.start), counters.event_cycles.eq(~self.ready)]
         for name in self._names[1:]:
             m.d.comb += getattr(counters, f"event_{name}").eq(

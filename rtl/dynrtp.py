@@ -22,7 +22,8 @@ from .microcode import Op, lane_width
 from .queue import Merge, Queue
 from .ray_generation import packet_layout
 from .ray_store import RayStore
-from .shader import Shader, shader_shapes
+from .shader import shader_shapes
+from .shaders import Shaders
 from .stack import TraversalStack
 from .texture import Texture
 from .threads import Threads
@@ -112,7 +113,8 @@ class DynRTP(wiring.Component):
             **members,
             "pixel": Out(stream.Signature(pixel_layout(fmt=fmt, index_width=config.index_width,
                                                        coord_width=config.coord_width))),
-            "events": Out(data.StructLayout({name: 1 for name in self.event_names(config)})),
+            "events": Out(data.StructLayout({name: range(config.num_shaders + 1) if name == "busy_shader" else 1
+                                             for name in self.event_names(config)})),
             "probe": Out(data.ArrayLayout(data.StructLayout({"valid": 1, "thread": thread_width(config.num_threads)}),
                                           len(UNITS))),
         })
@@ -170,8 +172,10 @@ class DynRTP(wiring.Component):
         }
         shader_parameters = dict(fmt=fmt, num_threads=config.num_threads, index_width=config.index_width,
                                  program=config.program, ray_stack_depth=config.ray_stack_depth)
+        num_readers = config.num_shaders if has_shader else 1
         tag = shader_shapes(**shader_parameters)["tag"] if has_shader else None
-        m.submodules.threads = threads = Threads(**token, coord_width=config.coord_width)
+        m.submodules.threads = threads = Threads(
+            **token, coord_width=config.coord_width, num_readers=num_readers)
         m.submodules.ray_store = store = RayStore(fmt=fmt, num_threads=config.num_threads)
         m.submodules.stack = stack = TraversalStack(**floats, **widths)
         m.submodules.traversal = traversal = Traversal(**computing, **widths)
@@ -180,7 +184,8 @@ class DynRTP(wiring.Component):
         m.submodules.transformation = transformation = Transformation(
             **computing, coord_width=config.coord_width, tag=tag, solid=has_shader, **widths)
         m.submodules.intersection = intersection = Intersection(
-            **computing, limited=has_shader, near=has_shader and config.shader.passes, **widths)
+            **computing, limited=has_shader, near=has_shader and config.shader.passes,
+            num_readers=num_readers, **widths)
 
         exhausted = self._trace(m, caches, stack, traversal, mailboxed_list, transformation, intersection)
         m.d.comb += [
@@ -200,8 +205,8 @@ class DynRTP(wiring.Component):
         ]
         wiring.connect(m, wiring.flipped(self.packet), threads.packet)
         if has_shader:
-            color = Shader(**shader_parameters, stack_depth=config.stack_depth, coord_width=config.coord_width,
-                           offset_log2=config.offset_log2)
+            color = Shaders(**shader_parameters, stack_depth=config.stack_depth, coord_width=config.coord_width,
+                            offset_log2=config.offset_log2, num_shaders=config.num_shaders)
             m.submodules.shader = color
             self._connect_shader(m, caches, color, transformation, intersection)
             wiring.connect(m, threads.primary, color.primary)
@@ -224,11 +229,17 @@ class DynRTP(wiring.Component):
         wiring.connect(m, exhausted, color.packet)
         wiring.connect(m, color.finished, threads.finished)
         wiring.connect(m, color.pixel, wiring.flipped(self.pixel))
+        for number in range(num_readers):
+            def port(name, number=number):
+                return getattr(color, name)[number] if has_shader else getattr(color, name)
+
+            m.d.comb += [
+                intersection.record_address[number].eq(port("record_address")),
+                port("record").eq(intersection.record[number]),
+                threads.position_address[number].eq(port("position_address")),
+                port("position").eq(threads.position[number]),
+            ]
         m.d.comb += [
-            intersection.record_address.eq(color.record_address),
-            color.record.eq(intersection.record),
-            threads.position_address.eq(color.position_address),
-            color.position.eq(threads.position),
             self.ready.eq(threads.ready & color.idle),
             self.flushed.eq(Cat(cache.flushed for cache in caches.values()).all()),
         ]

@@ -4,8 +4,8 @@ from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from .layout import PACKET_RAYS, camera_layout, thread_width
-from .microcode import Lane, Mode, Op, counter_width, instruction_layout
+from .layout import PACKET_RAYS, camera_layout, thread_slots, thread_width
+from .microcode import Lane, counter_width, instruction_layout
 from .queue import Queue
 from .register_file import RegisterFile, lanes_layout
 
@@ -27,7 +27,7 @@ def ray_token_layout(*, num_threads, program, stack_depth):
 
 
 class InstructionFetch(wiring.Component):
-    """Takes rays in turn, one instruction of each; in two cycles where it reads four registers, else in one.
+    """Takes rays in turn, one instruction of each; in two cycles where it is wide, else in one.
 
     A ray has one instruction under way at a time, so that none waits for another's result.
 
@@ -41,6 +41,8 @@ class InstructionFetch(wiring.Component):
         What rays do.
     stack_depth : int
         Registers on a ray's stack.
+    bank_bits : int
+        See :class:`~rtl.register_file.RegisterFile`.
 
     Members
     -------
@@ -55,13 +57,14 @@ class InstructionFetch(wiring.Component):
     #: Instructions that can be under way.
     capacity = 6
 
-    def __init__(self, *, fmt, num_threads, program, stack_depth):
+    def __init__(self, *, fmt, num_threads, program, stack_depth, bank_bits=0):
         self._fmt = fmt
         self._program = program
-        self._num_rays = PACKET_RAYS << thread_width(num_threads)
+        self._num_rays = PACKET_RAYS * thread_slots(num_threads, bank_bits)
         self._token = token = ray_token_layout(num_threads=num_threads, program=program, stack_depth=stack_depth)
         self._instruction = instruction = instruction_layout(len(program.instructions))
-        self._registers = RegisterFile(fmt=fmt, num_threads=num_threads, literals=program.literals)
+        self._registers = RegisterFile(fmt=fmt, num_threads=num_threads, literals=program.literals,
+                                       bank_bits=bank_bits)
         lanes = lanes_layout(fmt)
         self._out = data.StructLayout({"valid": 1, "token": token, "instruction": instruction,
                                        **{name: lanes for name in "abcx"}})
@@ -92,11 +95,10 @@ class InstructionFetch(wiring.Component):
         taken, decoded = Signal(self._token, reset_less=True), Signal(self._token, reset_less=True)
         instruction = Signal(self._instruction, reset_less=True)
         is_taken, is_decoded, second = Signal(), Signal(), Signal()
-        reads_four, stall, goes_on = Signal(), Signal(), Signal()
+        stall, goes_on = Signal(), Signal()
         take = Signal()
         m.d.comb += [
-            reads_four.eq((instruction.op == Op.VECTOR) & (instruction.mode != Mode.DIAGONAL)),
-            stall.eq(is_decoded & reads_four & ~second),
+            stall.eq(is_decoded & instruction.is_wide & ~second),
             goes_on.eq(is_decoded & ~stall),
             take.eq(ready.o.valid & self.admit & ~stall),
             ready.o.ready.eq(take),
@@ -133,8 +135,9 @@ class InstructionFetch(wiring.Component):
             out.token.eq(read.token),
             out.instruction.eq(read.instruction),
             out.a.eq(Mux(read.second, held[0].as_value(), registers.value[0].as_value())),
-            out.b.eq(registers.value[0]),
-            out.c.eq(registers.value[1]),
+            # Only where they are zero they are not read.
+            *(operand.eq(Mux(read.second, value.as_value(), 0))
+              for operand, value in zip((out.b, out.c), registers.value, strict=True)),
             *(out.x[lane].eq(self._selected(m, x, read.instruction, lane)) for lane in range(3)),
             self.under_way.eq(self.under_way + take - out.valid),
         ]

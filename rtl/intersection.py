@@ -74,6 +74,8 @@ class Intersection(wiring.Component):
         How it computes.
     limited : bool
         Whether rays have limits.
+    num_readers : int
+        Records that can be read at a time.
     near : bool
         Whether t_near is one of them; if not, it counts as 0.
 
@@ -86,12 +88,13 @@ class Intersection(wiring.Component):
     entered : ``{"valid", "thread", "index"}``: the packet's next hits belong to that instance
     tested : stream of tokens: a packet's rays are through, and its token knows which have a hit
     hit_address, hit_distances : a thread; two cycles later, t of each ray's hit
-    record_address, record : a thread and a ray; two cycles later, its hit
+    record_address, record : for each reader, a thread and a ray; two cycles later, its hit
     busy : a ray is taken in
     """
 
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None,
-                 arithmetic=ARITHMETICS[0], limited=False, near=False):
+                 arithmetic=ARITHMETICS[0], limited=False, near=False, num_readers=1):
+        self._num_readers = num_readers
         self._fmt = fmt
         self._near = near
         self._limited = limited
@@ -113,8 +116,9 @@ class Intersection(wiring.Component):
             "tested": Out(stream.Signature(token, always_ready=True)),
             "hit_address": In(thread_width(num_threads)),
             "hit_distances": Out(data.ArrayLayout(fmt, PACKET_RAYS)),
-            "record_address": In(data.StructLayout({"ray": range(PACKET_RAYS), "thread": thread_width(num_threads)})),
-            "record": Out(self._record),
+            "record_address": In(data.StructLayout({"ray": range(PACKET_RAYS), "thread": thread_width(num_threads)})
+                                 ).array(num_readers),
+            "record": Out(self._record).array(num_readers),
             "busy": Out(1),
         })
 
@@ -192,8 +196,7 @@ class Intersection(wiring.Component):
         m.d.comb += [new.valid.eq(better), new.thread.eq(done.token.thread), new.ray.eq(done.ray),
                      new.t.eq(Mux(is_over, self._fmt.const(0.0), test.t))]
         m.submodules.records = records = memory.Memory(shape=self._record, depth=PACKET_RAYS * num_slots, init=[])
-        record_read, record_write = records.read_port(), records.write_port()
-        record = Signal(self._record, reset_less=True)
+        record_write = records.write_port()
         m.d.comb += [
             entered_write.addr.eq(self.entered.thread),
             entered_write.data.eq(self.entered.index),
@@ -211,10 +214,12 @@ class Intersection(wiring.Component):
             record_write.data.instance.eq(instance_read.data),
             record_write.data.in_instance.eq(done.token.level),
             record_write.en.eq(new.valid),
-            record_read.addr.eq(self.record_address),
-            self.record.eq(record),
         ]
-        m.d.sync += record.eq(record_read.data)
+        for number in range(self._num_readers):
+            record_read = records.read_port()
+            record = Signal(self._record, name=f"record{number}", reset_less=True)
+            m.d.comb += [record_read.addr.eq(self.record_address[number]), self.record[number].eq(record)]
+            m.d.sync += record.eq(record_read.data)
 
         # A second copy of the distances, a memory for each ray, for the stack, which wants all four at once.
         for ray in range(PACKET_RAYS):

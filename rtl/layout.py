@@ -14,6 +14,7 @@ __all__ = [
     "list_entry_layout",
     "matrix_layout",
     "node_layout",
+    "thread_slots",
     "thread_width",
     "token_layout",
     "vector_layout",
@@ -47,6 +48,11 @@ class IntervalSource(enum.Enum, shape=2):
 def thread_width(num_threads):
     """Bits of a thread's number; one even for a single thread, for tools that know no memory of a single word."""
     return max(ceil_log2(num_threads), 1)
+
+
+def thread_slots(num_threads, bank_bits=0):
+    """Places for threads in a memory of those that agree in their lowest ``bank_bits`` bits."""
+    return 1 << max(thread_width(num_threads) - bank_bits, 0)
 
 
 def token_layout(*, num_threads, stack_depth):

@@ -143,12 +143,12 @@ _REGISTER_WIDTH = 6
 
 
 def instruction_layout(length):
-    """An instruction of a program of ``length`` instructions."""
+    """An instruction of a program of ``length`` instructions; a wide one reads ``b`` and ``c`` too."""
     register = range(1 << _REGISTER_WIDTH)
     return data.StructLayout({
         "op": Op, "mode": Mode, "condition": Condition, "store": Store, "bit": 5, "mask": 3,
         "dst": register, "a": register, "b": register, "c": register, "x": register,
-        "select": data.ArrayLayout(Lane, 3), "negate": 3, "target": range(max(length, 2)),
+        "select": data.ArrayLayout(Lane, 3), "negate": 3, "target": range(max(length, 2)), "is_wide": 1,
     })
 
 
@@ -232,10 +232,10 @@ class Assembler:
     def emit(self, op, *, dst=0, mask=7, a=None, b=None, c=None, x=None, mode=Mode.COLUMNS, store=Store.NOWHERE,
              condition=Condition.ALWAYS, bit=0, target=None):
         """One instruction; ``target`` is a label."""
+        a, b, c, x = (self._zero if register is None else register for register in (a, b, c, x))
         self._instructions.append(dict(
-            op=op, mode=mode, condition=condition, store=store, bit=bit, mask=mask, dst=dst,
-            a=self._zero if a is None else a, b=self._zero if b is None else b, c=self._zero if c is None else c,
-            **self._lanes(self._zero if x is None else x), target=target))
+            op=op, mode=mode, condition=condition, store=store, bit=bit, mask=mask, dst=dst, a=a, b=b, c=c,
+            **self._lanes(x), target=target, is_wide=int(op is Op.VECTOR and (b, c) != (self._zero,) * 2)))
 
     def assembled(self):
         """The program.

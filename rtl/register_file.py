@@ -5,7 +5,7 @@ from amaranth.lib import data, memory, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import exact_log2
 
-from .layout import PACKET_RAYS, camera_layout, thread_width
+from .layout import PACKET_RAYS, camera_layout, thread_slots, thread_width
 from .microcode import NUM_REGISTERS, lane_width
 
 __all__ = ["RegisterFile", "lanes_layout"]
@@ -27,6 +27,8 @@ class RegisterFile(wiring.Component):
         Format of floats.
     num_threads : int
         Threads, of four rays each.
+    bank_bits : int
+        Lowest bits of a thread's number that are the same for all threads here.
     literals : sequence
         Constants after the camera's, each three floats or integers.
 
@@ -40,12 +42,13 @@ class RegisterFile(wiring.Component):
 
     read_latency = 2
 
-    def __init__(self, *, fmt, num_threads, literals):
+    def __init__(self, *, fmt, num_threads, literals, bank_bits=0):
         self._fmt = fmt
         self._literals = tuple(literals)
         self._lanes = lanes_layout(fmt)
         ray = {"thread": thread_width(num_threads), "ray": range(PACKET_RAYS)}
-        self._depth = NUM_REGISTERS * PACKET_RAYS << thread_width(num_threads)
+        self._bank_bits = bank_bits
+        self._depth = NUM_REGISTERS * PACKET_RAYS * thread_slots(num_threads, bank_bits)
         address = data.StructLayout({**ray, "number": range(2 * NUM_REGISTERS)})
         super().__init__({
             "camera": In(camera_layout(fmt)),
@@ -81,8 +84,8 @@ class RegisterFile(wiring.Component):
                 read, write = bank.read_port(), bank.write_port()
                 stored = Signal(width, name=f"stored{port}_{lane}", reset_less=True)
                 m.d.comb += [
-                    read.addr.eq(Cat(address.number[:number_bits], address.ray, address.thread)),
-                    write.addr.eq(Cat(self.write.number, self.write.ray, self.write.thread)),
+                    read.addr.eq(Cat(address.number[:number_bits], address.ray, address.thread[self._bank_bits:])),
+                    write.addr.eq(Cat(self.write.number, self.write.ray, self.write.thread[self._bank_bits:])),
                     write.data.eq(self.write.value[lane]),
                     write.en.eq(self.write.valid & self.write.mask[lane]),
                     value[lane].eq(Mux(is_constant[1], constant[1].word_select(lane, width), stored)),

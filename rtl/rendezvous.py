@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from .instruction_fetch import ray_token_layout
 from .intersection import limits_layout
-from .layout import PACKET_RAYS, IntervalSource, thread_width, token_layout
+from .layout import PACKET_RAYS, IntervalSource, thread_slots, thread_width, token_layout
 from .register_file import lanes_layout
 
 __all__ = ["Rendezvous", "TraceFlag", "stop_layout"]
@@ -41,6 +41,8 @@ class Rendezvous(wiring.Component):
         The shader's.
     ray_stack_depth : int
         Registers on a ray's stack.
+    bank_bits : int
+        See :class:`~rtl.register_file.RegisterFile`.
 
     Members
     -------
@@ -56,10 +58,11 @@ class Rendezvous(wiring.Component):
     finished : stream of tokens: the packet's thread is free
     """
 
-    def __init__(self, *, fmt, num_threads, stack_depth, index_width, program, ray_stack_depth):
+    def __init__(self, *, fmt, num_threads, stack_depth, index_width, program, ray_stack_depth, bank_bits=0):
         self._fmt = fmt
         self._index_width = index_width
-        self._num_threads = num_threads
+        self._num_slots = thread_slots(num_threads, bank_bits)
+        self._bank_bits = bank_bits
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         self._ray = ray = ray_token_layout(num_threads=num_threads, program=program, stack_depth=ray_stack_depth)
         lanes = lanes_layout(fmt)
@@ -110,14 +113,14 @@ class Rendezvous(wiring.Component):
         state_layout = data.StructLayout({"running": PACKET_RAYS, "traced": PACKET_RAYS, "hit": PACKET_RAYS,
                                           "shared": 1, "origin": len(stop.x[2])})
         m.submodules.states = states = memory.Memory(
-            shape=state_layout, depth=1 << thread_width(self._num_threads), init=[])
+            shape=state_layout, depth=self._num_slots, init=[])
         read, write = states.read_port(domain="comb"), states.write_port()
         before, after = read.data, Signal(state_layout)
         stopped = Signal(PACKET_RAYS)
         same = Signal()
         all_stopped, goes_on = Signal(), Signal()
         m.d.comb += [
-            read.addr.eq(stop.token.thread),
+            read.addr.eq(stop.token.thread[self._bank_bits:]),
             stopped.eq(1 << stop.token.ray),
             same.eq(stop.flags[TraceFlag.SAME_ORIGIN]
                     & (~before.traced.any() | before.shared & (before.origin == stop.x[2]))),
@@ -130,7 +133,7 @@ class Rendezvous(wiring.Component):
             goes_on.eq(all_stopped & after.traced.any()),
             self.begin.ready.eq(~accept),
             write.en.eq(accept | self.begin.valid),
-            write.addr.eq(Mux(accept, stop.token.thread, self.begin.payload.thread)),
+            write.addr.eq(Mux(accept, stop.token.thread, self.begin.payload.thread)[self._bank_bits:]),
         ]
         # Between packets only `running` matters: it is what is to come back.
         with m.If(~accept):
@@ -157,7 +160,7 @@ class Rendezvous(wiring.Component):
         """Hands the rays of a packet that is traced back, one a cycle."""
         kept_layout = data.StructLayout({"counter": self._ray["counter"].shape, "sp": self._ray["sp"].shape})
         m.submodules.kept = kept = memory.Memory(
-            shape=kept_layout, depth=PACKET_RAYS << thread_width(self._num_threads), init=[])
+            shape=kept_layout, depth=PACKET_RAYS * self._num_slots, init=[])
         read, write = kept.read_port(), kept.write_port()
         packet = self.packet.payload
         done = Signal(PACKET_RAYS)
@@ -171,13 +174,13 @@ class Rendezvous(wiring.Component):
         m.d.comb += [
             # A packet's mask has lost rays on the way; all that are to come back have been counted as running.
             remaining.eq(running.data.running & ~done),
-            running.addr.eq(packet.thread),
+            running.addr.eq(packet.thread[self._bank_bits:]),
             others.eq(remaining & (remaining - 1)),
             moves.eq(self.packet.valid & (~reading | self.ray.ready)),
             self.packet.ready.eq(moves & ~others.any()),
-            read.addr.eq(Cat(ray, packet.thread)),
+            read.addr.eq(Cat(ray, packet.thread[self._bank_bits:])),
             read.en.eq(moves),
-            write.addr.eq(Cat(stop.token.ray, stop.token.thread)),
+            write.addr.eq(Cat(stop.token.ray, stop.token.thread[self._bank_bits:])),
             write.data.counter.eq(stop.token.counter),
             write.data.sp.eq(stop.token.sp),
             write.en.eq(accept & stop.is_trace),

@@ -58,6 +58,8 @@ class Shader(wiring.Component):
         Registers on a ray's stack.
     offset_log2 : int
         See :attr:`~rtl.microcode.Op.OFFSET`.
+    bank_bits : int
+        See :class:`~rtl.register_file.RegisterFile`.
 
     Members
     -------
@@ -75,7 +77,7 @@ class Shader(wiring.Component):
     """
 
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, coord_width, program, ray_stack_depth,
-                 offset_log2=1):
+                 offset_log2=1, bank_bits=0):
         self._fmt = fmt
         self._num_threads = num_threads
         self._coord_width = coord_width
@@ -87,9 +89,10 @@ class Shader(wiring.Component):
         self._index_width = index_width
         rays = dict(num_threads=num_threads, program=program)
         self._ray = ray_token_layout(**rays, stack_depth=ray_stack_depth)
-        self._fetch = InstructionFetch(fmt=fmt, **rays, stack_depth=ray_stack_depth)
-        self._control = ControlUnit(fmt=fmt, **rays, stack_depth=ray_stack_depth, index_width=index_width)
-        self._rendezvous = Rendezvous(fmt=fmt, **rays, stack_depth=stack_depth, index_width=index_width,
+        bank = dict(bank_bits=bank_bits)
+        self._fetch = InstructionFetch(fmt=fmt, **rays, **bank, stack_depth=ray_stack_depth)
+        self._control = ControlUnit(fmt=fmt, **rays, **bank, stack_depth=ray_stack_depth, index_width=index_width)
+        self._rendezvous = Rendezvous(fmt=fmt, **rays, **bank, stack_depth=stack_depth, index_width=index_width,
                                       ray_stack_depth=ray_stack_depth)
         self._result = result_layout(self._ray, lanes_layout(fmt))
         self._color = ColorUnit(fmt=fmt, offset_log2=offset_log2, operations=self._ops & _COLOR_OPS)

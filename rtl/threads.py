@@ -18,6 +18,8 @@ class Threads(wiring.Component):
     ----------
     num_threads, stack_depth, coord_width : int
         See :class:`~rtl.config.ChipConfig`.
+    num_readers : int
+        Positions that can be read at a time.
 
     Members
     -------
@@ -27,10 +29,10 @@ class Threads(wiring.Component):
     primary : stream of ``{"token", "x", "y"}``: the packet, see :class:`~rtl.transformation.Transformation`
     begin : ``{"valid", "thread"}``: the thread begins a packet
     finished : stream of tokens: the thread has nothing more to do
-    position_address, position : a thread; pixel ``{"x", "y"}`` of its ray 0, combinational
+    position_address, position : for each reader, a thread; pixel ``{"x", "y"}`` of its ray 0, combinational
     """
 
-    def __init__(self, *, num_threads, stack_depth, coord_width):
+    def __init__(self, *, num_threads, stack_depth, coord_width, num_readers=1):
         self._num_threads = num_threads
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         self._position = data.StructLayout({"x": coord_width, "y": coord_width})
@@ -43,8 +45,8 @@ class Threads(wiring.Component):
             "primary": Out(stream.Signature(with_token(token, x=half, y=half))),
             "begin": Out(data.StructLayout({"valid": 1, "thread": thread_width(num_threads)})),
             "finished": In(stream.Signature(token, always_ready=True)),
-            "position_address": In(thread_width(num_threads)),
-            "position": Out(self._position),
+            "position_address": In(thread_width(num_threads)).array(num_readers),
+            "position": Out(self._position).array(num_readers),
         })
 
     def elaborate(self, platform):
@@ -53,7 +55,7 @@ class Threads(wiring.Component):
         m.submodules.free = free = Queue(thread_width(threads), depth=threads, always_ready=True)
         m.submodules.positions = positions = memory.Memory(
             shape=self._position, depth=1 << thread_width(threads), init=[])
-        write, read = positions.write_port(), positions.read_port(domain="comb")
+        write = positions.write_port()
 
         # At first every thread is free without having finished anything.
         unused = Signal(range(threads + 1), init=threads)
@@ -80,10 +82,11 @@ class Threads(wiring.Component):
             write.data.x.eq(packet.x),
             write.data.y.eq(packet.y),
             write.en.eq(issued),
-            read.addr.eq(self.position_address),
-            self.position.eq(read.data),
             self.ready.eq(~at_work.any()),
         ]
+        for address, position in zip(self.position_address, self.position, strict=True):
+            read = positions.read_port(domain="comb")
+            m.d.comb += [read.addr.eq(address), position.eq(read.data)]
         m.d.sync += at_work.eq(at_work + issued - self.finished.valid)
         with m.If(issued & unused.any()):
             m.d.sync += unused.eq(unused - 1)

@@ -68,7 +68,7 @@ def report_of(counters, bytes_read, num_rays, rate, config):
     return dict(
         cycles=cycles, rays=num_rays, cycles_per_ray=cycles / num_rays, packets=counters["packets"],
         traces=counters["traces"],
-        busy={unit: counters[f"busy_{unit}"] / cycles / num_pipelines
+        busy={unit: counters[f"busy_{unit}"] / cycles / num_pipelines / (config.num_shaders if unit == "shader" else 1)
               for unit in _UNITS if f"busy_{unit}" in counters},
         cache={name: {"hits": counters[f"hit_{name}"], "misses": counters[f"miss_{name}"]}
                for name in cache_names(config)},

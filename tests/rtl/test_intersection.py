@@ -121,7 +121,7 @@ def run(world, *, num_threads, gap, latencies=LATENCIES):
             assert fields(token) == world.expected.pop(thread)
             ctx.set(dut.hit_address, thread)
             for ray in range(PACKET_RAYS + 1):
-                ctx.set(dut.record_address, {"thread": thread, "ray": ray % PACKET_RAYS})
+                ctx.set(dut.record_address[0], {"thread": thread, "ray": ray % PACKET_RAYS})
                 await ctx.tick()
                 if ray and ray - 1 in world.hits[thread]:
                     await check_record(ctx, thread, ray - 1)
@@ -129,7 +129,7 @@ def run(world, *, num_threads, gap, latencies=LATENCIES):
 
     async def check_record(ctx, thread, ray):
         expected = world.hits[thread][ray]
-        record = ctx.get(dut.record)
+        record = ctx.get(dut.record[0])
         assert same(ctx.get(dut.hit_distances[ray]), expected["t"])
         for name in ("t", "u", "v", "cosine"):
             assert same(record[name], expected[name])

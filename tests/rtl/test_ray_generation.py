@@ -39,8 +39,8 @@ class Controller(wiring.Component):
         wiring.connect(m, rays.packet[0], threads.packet)
         wiring.connect(m, threads.primary, wiring.flipped(self.primary))
         wiring.connect(m, wiring.flipped(self.finished), threads.finished)
-        m.d.comb += [self.begin.eq(threads.begin), threads.position_address.eq(self.position_address),
-                     self.position.eq(threads.position), rays.start.eq(self.start),
+        m.d.comb += [self.begin.eq(threads.begin), threads.position_address[0].eq(self.position_address[0]),
+                     self.position[0].eq(threads.position[0]), rays.start.eq(self.start),
                      self.ready.eq(rays.ready & threads.ready)]
         for unit in (rays, threads):
             m.d.comb += [unit.width.eq(self.width), unit.height.eq(self.height)]
@@ -90,8 +90,8 @@ def test_pictures(seed, num_threads, sizes, gap):
             while expected or at_work:
                 if waiting and rng.random() < 0.3:
                     thread = waiting.pop(rng.randrange(len(waiting)))
-                    ctx.set(dut.position_address, thread)
-                    position = ctx.get(dut.position)
+                    ctx.set(dut.position_address[0], thread)
+                    position = ctx.get(dut.position[0])
                     assert (position.x, position.y) == at_work[thread]
                     finished.append(random_token(rng, thread=thread, stack_depth=2))
                 await ctx.tick()
