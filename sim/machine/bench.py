@@ -92,6 +92,20 @@ class Bench:
         self._library.bench_memory(self._bench, MEMORIES.index(name), _array(padded, c_uint32),
                                    c_uint64(padded.size), c_uint32(words_at_once))
 
+    def write(self, name, first, words):
+        """Changes words of a memory that is loaded, from the word numbered ``first`` on.
+
+        Raises
+        ------
+        SimulationError
+            If they do not all lie in the memory.
+        """
+        memory, words = self._memories.get(name, np.empty(0)), np.ravel(words)
+        if not 0 <= first <= memory.size - words.size:
+            raise SimulationError(f"words {first} to {first + words.size - 1} are not all in the memory '{name}', "
+                                  f"which has {memory.size}")
+        memory[first:first + words.size] = words
+
     def trace(self, path, *, first=0, last=1 << 62):
         """Writes a waveform of the cycles from ``first`` to before ``last``, counted from now."""
         if not self._library.bench_trace(self._bench, str(path).encode(), c_uint64(first), c_uint64(last)):

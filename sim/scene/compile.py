@@ -127,6 +127,11 @@ class CompiledScene:
         return MemoryLayout(2, count, _even(max(_HEADROOM * first.num_nodes, 2 * count)),
                             max(_HEADROOM * first.num_entries, 2 * count))
 
+    @property
+    def needs(self):
+        """The least :class:`~rtl.program.features.ShaderFeatures` that draw all that is in the scene."""
+        return needed_features(self._scene, instances=not self.is_flat)
+
     def image(self, scene, *, eye=None, background=(0, 0, 0), slot=None):
         """The memory image with the instances where ``scene`` has them.
 
@@ -282,7 +287,7 @@ class CompiledScene:
         records, texels, first_light = shading_records(self._scene, image, parts=shaded, background=background,
                                                        num_slots=layout.num_slots)
         image = replace(image, records=pack_fields(records, lane_width(fmt)), texels=texels,
-                        needs=needed_features(self._scene, instances=not self.is_flat),
+                        needs=self.needs,
                         stats={**image.stats, "records": len(records), "texels": len(texels)})
         return _Static(layout, background, image, first_light)
 

@@ -104,19 +104,24 @@ class SceneImage:
                        stack_depth=update.stack_depth)
 
     def _memories(self):
-        full = () if self.records is None else (self.records, self.texels)
-        return self.nodes, self.lists, self.matrices, *(full or (self.shading,))
+        names = "nodes", "lists", "matrices", *(("shading",) if self.records is None else ("records", "texels"))
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def bytes_of_memories(self):
+        """Size of each memory."""
+        return {name: memory.nbytes for name, memory in self._memories().items()}
 
     @property
     def num_bytes(self):
         """Size of all memories together."""
-        return sum(memory.nbytes for memory in self._memories())
+        return sum(self.bytes_of_memories.values())
 
     @property
     def checksum(self):
         """CRC-32 of all memories."""
         crc = 0
-        for memory in self._memories():
+        for memory in self._memories().values():
             crc = zlib.crc32(memory.astype("<u4").tobytes(), crc)
         return crc
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-__all__ = ["MemoryLayout", "Piece", "SceneUpdate"]
+__all__ = ["MemoryLayout", "Piece", "SceneUpdate", "upload_report"]
 
 
 @dataclass(frozen=True)
@@ -119,6 +119,35 @@ class SceneUpdate:
     def bytes_between(self):
         """Bytes of each memory that are written between two frames."""
         return _bytes(self.between)
+
+
+def upload_report(image, update=None, *, cycles=None):
+    """What a frame's upload takes, for its report.
+
+    Parameters
+    ----------
+    image : SceneImage
+        The frame's.
+    update : SceneUpdate, optional
+        What made it of the last frame's; none for the first frame, for which all is uploaded.
+    cycles : int, optional
+        That the chip was busy with the last frame.
+
+    Returns
+    -------
+    dict
+        ``ahead`` and ``between``: bytes of each memory that are written while the last frame is drawn, and before this
+        one begins; ``bytes``: of both; ``bytes_per_cycle``: how fast those ahead must be written to be there in time,
+        if that is known.
+    """
+    if update is None:
+        ahead, between = {}, image.bytes_of_memories
+    else:
+        ahead, between = update.bytes_ahead, update.bytes_between
+    report = {"ahead": ahead, "between": between, "bytes": sum(ahead.values()) + sum(between.values())}
+    if cycles is not None:
+        report["bytes_per_cycle"] = sum(ahead.values()) / cycles
+    return report
 
 
 def _bytes(pieces):
