@@ -136,14 +136,15 @@ class Scene:
         if len(self.lights) > MAX_LIGHTS:
             raise SceneError(f"scene has {len(self.lights)} lights; the shader has room for {MAX_LIGHTS}; "
                              "leave some out")
-        for number, instance in enumerate(self.instances):
-            linear = instance.transform[:, :3]
-            if not np.isfinite(instance.transform).all():
-                raise SceneError(f"node '{instance.name}' (instance {number}): transform has a value that is not "
-                                 "finite")
-            if np.linalg.matrix_rank(linear) < 3 or np.linalg.cond(linear) > _MAX_CONDITION:
-                raise SceneError(f"node '{instance.name}' (instance {number}): transform is singular (flattens "
-                                 "the mesh); give it a non-zero scale on every axis")
+        transforms = np.array([instance.transform for instance in self.instances]).reshape(-1, 3, 4)
+        finite = np.isfinite(transforms).all(axis=(1, 2))
+        regular, linear = finite.copy(), transforms[finite, :, :3]
+        regular[finite] = (np.linalg.matrix_rank(linear) == 3) & ~(np.linalg.cond(linear) > _MAX_CONDITION)
+        if not regular.all():
+            number = int(np.argmin(regular))
+            what = ("is singular (flattens the mesh); give it a non-zero scale on every axis" if finite[number] else
+                    "has a value that is not finite")
+            raise SceneError(f"node '{self.instances[number].name}' (instance {number}): transform {what}")
         if not any(self.meshes[instance.mesh].usable.any() for instance in self.instances):
             raise SceneError("scene is empty: no instance has a usable triangle")
 
@@ -159,15 +160,13 @@ class Scene:
 
     def bounds(self):
         """``(lower, upper)`` float64[3], world space, of the corners of the instances' boxes."""
-        corners = []
-        for instance in self.instances:
-            box = np.array(self.meshes[instance.mesh].bounds())
-            if np.isfinite(box).all():
-                which = np.indices((2, 2, 2)).reshape(3, 8).T
-                points = np.take_along_axis(box, which, axis=0)
-                corners.append(points @ instance.transform[:, :3].T + instance.transform[:, 3])
-        corners = np.concatenate(corners)
-        return corners.min(axis=0), corners.max(axis=0)
+        boxes = np.array([mesh.bounds() for mesh in self.meshes])
+        shown = [instance for instance in self.instances if np.isfinite(boxes[instance.mesh]).all()]
+        transforms = np.array([instance.transform for instance in shown])
+        which = np.indices((2, 2, 2)).reshape(1, 3, 8).swapaxes(1, 2)
+        corners = np.take_along_axis(boxes[[instance.mesh for instance in shown]], which, axis=1)
+        corners = corners @ transforms[:, :, :3].swapaxes(1, 2) + transforms[:, None, :, 3]
+        return corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
 
     def default_camera(self):
         """First camera of the file, else a view of the whole scene from above one corner.

@@ -77,26 +77,28 @@ def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, room=None):
         If an instance's transform does not fit the format.
     """
     center, scale = unit_box(*scene.bounds())
-    maps, bounds = np.empty((len(shown), 4, 3)), np.empty((len(shown), 2, 3))
-    for slot, number in enumerate(shown):
-        placed = scene.instances[number]
-        mesh_center, mesh_scale = spaces[placed.mesh]
-        linear = placed.transform[:, :3]
-        middle = (linear @ mesh_center + placed.transform[:, 3] - center) * scale
-        inverse = np.linalg.inv(linear) * (mesh_scale / scale)
-        maps[slot, :3] = fmt.quantize(inverse)
-        maps[slot, 3] = fmt.quantize(middle)
-        if not np.isfinite(maps[slot]).all() or np.linalg.matrix_rank(maps[slot, :3]) < 3:
-            raise SceneError(f"instance '{placed.name}': its transform does not fit format {fmt}, whose values "
-                             f"are from {fmt.min_normal:.3g} to {fmt.max:.3g}; choose a format with more exponent "
-                             "bits, or scale the instance less")
-        # The chip's map is the rounded one, so the box is that of its inverse.
-        which = np.indices((2, 2, 2)).reshape(3, 8).T
-        corners = np.take_along_axis(boxes[placed.mesh], which, axis=0)
-        world = corners @ np.linalg.inv(maps[slot, :3]).T + maps[slot, 3]
-        # What the transformed ray is off by in the mesh's space, seen from the scene's.
-        slack = 4 * 2.0 ** -fmt.frac_width * np.abs(world - maps[slot, 3]).max()
-        bounds[slot] = world.min(axis=0) - slack, world.max(axis=0) + slack
+    placed = [scene.instances[number] for number in shown]
+    meshes = [instance.mesh for instance in placed]
+    transforms = np.array([instance.transform for instance in placed])
+    mesh_centers, mesh_scales = (np.array([spaces[mesh][k] for mesh in meshes]) for k in (0, 1))
+    linear = transforms[:, :, :3]
+    middles = ((linear @ mesh_centers[..., None])[..., 0] + transforms[:, :, 3] - center) * scale
+    inverses = np.linalg.inv(linear) * (mesh_scales / scale)[:, None, None]
+    maps = fmt.quantize(np.concatenate([inverses, middles[:, None]], axis=1))
+    fits = np.isfinite(maps).all(axis=(1, 2))
+    fits[fits] = np.linalg.matrix_rank(maps[fits, :3]) == 3
+    if not fits.all():
+        name = placed[int(np.argmin(fits))].name
+        raise SceneError(f"instance '{name}': its transform does not fit format {fmt}, whose values "
+                         f"are from {fmt.min_normal:.3g} to {fmt.max:.3g}; choose a format with more exponent "
+                         "bits, or scale the instance less")
+    # The chip's map is the rounded one, so the box is that of its inverse.
+    which = np.indices((2, 2, 2)).reshape(1, 3, 8).swapaxes(1, 2)
+    corners = np.take_along_axis(np.array([boxes[mesh] for mesh in meshes]), which, axis=1)
+    world = corners @ np.linalg.inv(maps[:, :3]).swapaxes(1, 2) + maps[:, 3:]
+    # What the transformed ray is off by in the mesh's space, seen from the scene's.
+    slack = 4 * 2.0 ** -fmt.frac_width * np.abs(world - maps[:, 3:]).max(axis=(1, 2))[:, None]
+    bounds = np.stack([world.min(axis=1) - slack, world.max(axis=1) + slack], axis=1)
     while True:
         tree = tree_over(bounds[:, 0], bounds[:, 1], fmt=fmt, cost=INSTANCE_COST, max_depth=max_depth)
         found = TopLevel(center, scale, maps, tree)
