@@ -130,15 +130,18 @@ def _frames(order, compiled, poses, is_moving, console):
         image = None
         for number, (scene, camera) in enumerate(poses):
             with progress_on(console, what) as progress:
-                eye, update = camera.eye if order.is_full else None, None
+                eye = camera.eye if order.is_full else None
+                update = seconds = None
                 if image is None:
                     image = compiled.image(scene, eye=eye, background=order.background, slot=0 if is_moving else None)
                 else:
+                    begin = time.perf_counter()
                     update = compiled.update(scene, slot=number & 1, eye=eye)
+                    seconds = time.perf_counter() - begin
                     image = image.updated(update)
                 frame = _picture(order, image, camera, order.chip_for(compiled), progress)
                 if is_moving:
-                    frame.report["upload"] = upload_report(image, update)
+                    frame.report["upload"] = upload_report(image, update, seconds=seconds)
             yield frame, image
 
 

@@ -1,5 +1,7 @@
 """Frames of a moving scene by one simulated chip, whose memories are written while it draws."""
 
+import time
+
 from ..scene.slots import upload_report
 from .bench import Bench
 from .machine import draw_frame, load_image
@@ -57,7 +59,7 @@ def render_frames(compiled, poses, width, height, *, config, background=(0, 0, 0
 
     scene, camera = pose
     image = compiled.image(scene, eye=eye(camera), background=background, slot=0)
-    update, cycles, slot = None, None, 0
+    update, seconds, cycles, slot = None, None, None, 0
     with Bench(config, latency=latency, jitter=jitter, seed=seed, progress=progress) as bench:
         load_image(bench, image, config)
         progress("drawing")
@@ -65,13 +67,15 @@ def render_frames(compiled, poses, width, height, *, config, background=(0, 0, 0
             following = next(poses, None)
             if following is not None:
                 slot ^= 1
+                begin = time.perf_counter()
                 coming = compiled.update(following[0], slot=slot, eye=eye(following[1]))
+                coming_seconds = time.perf_counter() - begin
                 _write(bench, coming.ahead)
             frame, _, _ = draw_frame(bench, image, camera, width, height, config=config, background=background)
-            frame.report["upload"] = upload_report(image, update, cycles=cycles)
+            frame.report["upload"] = upload_report(image, update, cycles=cycles, seconds=seconds)
             yield image, frame
             if following is None:
                 return
             _write(bench, coming.between)
-            update, camera, cycles = coming, following[1], frame.report["cycles"]
+            update, seconds, camera, cycles = coming, coming_seconds, following[1], frame.report["cycles"]
             image = image.updated(update)

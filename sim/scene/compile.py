@@ -224,7 +224,7 @@ class CompiledScene:
         return SceneUpdate(
             slot=slot, root=layout.static_node if top is None else layout.first_node(slot), center=center,
             scale=scale, stack_depth=max(depths + ([] if top is None else [top.tree.max_depth])),
-            ahead=tuple(ahead), between=tuple(between))
+            ahead=tuple(ahead), is_cut=top is not None and top.is_cut, between=tuple(between))
 
     def _static(self, layout, is_full, background):
         """All that does not move; of memories with slots kept, as it is wanted again for each frame."""

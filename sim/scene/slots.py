@@ -1,6 +1,6 @@
 """Where what moves lies in the memories, twice: one frame is written while the last one is drawn."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -97,6 +97,8 @@ class SceneUpdate:
         As of the frame's :class:`~sim.scene.image.SceneImage`.
     ahead : tuple of Piece
         What lies in the slot, and so may be written while the other slot's frame is drawn.
+    is_cut : bool
+        The top-level tree is shallower than it would be with more room.
     between : tuple of Piece
         What both slots share, and so must be written when the last frame is done and before this one begins: the
         record that tells where the lights are.
@@ -108,7 +110,8 @@ class SceneUpdate:
     scale: float
     stack_depth: int
     ahead: tuple
-    between: tuple = field(default=())
+    is_cut: bool
+    between: tuple = ()
 
     @property
     def bytes_ahead(self):
@@ -121,7 +124,7 @@ class SceneUpdate:
         return _bytes(self.between)
 
 
-def upload_report(image, update=None, *, cycles=None):
+def upload_report(image, update=None, *, cycles=None, seconds=None):
     """What a frame's upload takes, for its report.
 
     Parameters
@@ -132,19 +135,23 @@ def upload_report(image, update=None, *, cycles=None):
         What made it of the last frame's; none for the first frame, for which all is uploaded.
     cycles : int, optional
         That the chip was busy with the last frame.
+    seconds : float, optional
+        That the host took to make the update.
 
     Returns
     -------
     dict
         ``ahead`` and ``between``: bytes of each memory that are written while the last frame is drawn, and before this
-        one begins; ``bytes``: of both; ``bytes_per_cycle``: how fast those ahead must be written to be there in time,
-        if that is known.
+        one begins; ``bytes``: of both; of an update also ``is_cut`` and ``host_seconds``; ``bytes_per_cycle``: how fast
+        those ahead must be written to be there in time, if that is known.
     """
     if update is None:
         ahead, between = {}, image.bytes_of_memories
     else:
         ahead, between = update.bytes_ahead, update.bytes_between
     report = {"ahead": ahead, "between": between, "bytes": sum(ahead.values()) + sum(between.values())}
+    if update is not None:
+        report |= {"is_cut": update.is_cut, "host_seconds": seconds}
     if cycles is not None:
         report["bytes_per_cycle"] = sum(ahead.values()) / cycles
     return report

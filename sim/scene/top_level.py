@@ -30,12 +30,15 @@ class TopLevel:
         Each instance's matrix from the scene's space into its mesh's: rows and C, in the chip's format.
     tree : KdTree
         Over the instances' boxes.
+    is_cut : bool
+        It is shallower than it would be with more room.
     """
 
     center: np.ndarray
     scale: float
     maps: np.ndarray
     tree: object
+    is_cut: bool
 
     @property
     def num_nodes(self):
@@ -99,10 +102,11 @@ def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, room=None):
     # What the transformed ray is off by in the mesh's space, seen from the scene's.
     slack = 4 * 2.0 ** -fmt.frac_width * np.abs(world - maps[:, 3:]).max(axis=(1, 2))[:, None]
     bounds = np.stack([world.min(axis=1) - slack, world.max(axis=1) + slack], axis=1)
+    is_cut = False
     while True:
         tree = tree_over(bounds[:, 0], bounds[:, 1], fmt=fmt, cost=INSTANCE_COST, max_depth=max_depth)
-        found = TopLevel(center, scale, maps, tree)
+        found = TopLevel(center, scale, maps, tree, is_cut)
         if room is None or (found.num_nodes <= room[0] and found.num_entries <= room[1]):
             return found
         # In the end a leaf at the root, which always fits.
-        max_depth = tree.max_depth // 2
+        is_cut, max_depth = True, tree.max_depth // 2

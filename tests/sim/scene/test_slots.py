@@ -145,6 +145,8 @@ def test_a_tree_that_outgrows_its_slot_is_kept_shallower():
     # The scene as compiled needs a single leaf.
     assert len(plain.nodes) - len(compiled.image(scene).nodes) > layout.top_nodes
     update = compiled.update(spread, slot=1)
+    assert update.is_cut
+    assert not compiled.update(scene, slot=1).is_cut
     nodes, lists, _ = update.ahead
     assert nodes.first == layout.first_node(1)
     assert 2 < len(nodes.items) <= layout.top_nodes
