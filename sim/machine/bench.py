@@ -111,7 +111,7 @@ class Bench:
         if not self._library.bench_trace(self._bench, str(path).encode(), c_uint64(first), c_uint64(last)):
             raise SimulationError(f"waveform {path} cannot be opened")
 
-    def draw(self, *, camera, root, width, height, background, max_cycles=1 << 40, hang_cycles=20_000):
+    def draw(self, *, camera, root, width, height, background, max_cycles=1 << 40, hang_cycles=None):
         """Draws one picture.
 
         Returns
@@ -124,7 +124,8 @@ class Bench:
         Raises
         ------
         HangError
-            If no unit took anything in for ``hang_cycles`` cycles.
+            If no unit took anything in for ``hang_cycles`` cycles. Default: 20,000, and 200,000 of a chip with a shader,
+            in which all rays may be at work for long before any of them is traced.
         SimulationError
             If an assertion of the chip fails, it reads beyond a memory or writes beyond the picture, or the
             picture takes more than ``max_cycles``.
@@ -132,6 +133,7 @@ class Bench:
             If the user interrupts.
         """
         library, config = self._library, self._config
+        hang_cycles = hang_cycles or (20_000 if config.shader is None else 200_000)
         layout = pixel_layout(fmt=config.fmt, index_width=config.index_width, coord_width=config.coord_width)
         words = -(-layout.size // 32)
         pixels = np.zeros((height, width, words), np.uint32)
