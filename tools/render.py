@@ -2,24 +2,21 @@
 
 import contextlib
 import json
-import sys
-import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import click
 import numpy as np
-from PIL import Image
 from rich.console import Console
 
 from fpu import FloatFormat
 from sim.golden import MAX_DEPTH, SHADINGS, psnr, render_golden
-from sim.machine import render_pysim, render_rtl
-from sim.model import render_full, render_model
 from sim.scene import Sky, load_scene
 from sim.scene.compile import CompiledScene
 from sim.scene.texture import decode_texture
 
+from .animation import frame_durations, save_animation, save_picture
+from .engines import ENGINES, Order, draw, model_picture, progress_on
 from .errors import BadInput, clear_errors, written_whole
 from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, chip_config
 
@@ -31,9 +28,9 @@ _CHECKED_PIXELS = 1 << 21
 
 @click.command()
 @click.argument("scene")
-@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="PNG to write  [default: "
-              "the scene's name + .png]")
-@click.option("--engine", type=click.Choice(["golden", "model", "rtl", "pysim"]), default="rtl", show_default=True,
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="PNG to write, or "
+              "GIF of --frames  [default: the scene's name + .png]")
+@click.option("--engine", type=click.Choice(ENGINES), default="rtl", show_default=True,
               help="golden: float64 ray tracer; model: the chip without a clock; rtl: the Verilated chip; pysim: the "
               "chip in Amaranth's simulator")
 @click.option("--size", type=SIZE, default="512x384", show_default=True)
@@ -41,8 +38,8 @@ _CHECKED_PIXELS = 1 << 21
               help="The chip's floats: exponent and fraction bits")
 @click.option("--camera", type=CAMERA, help="eye x,y,z, look-at x,y,z, up x,y,z, horizontal field of view in degrees")
 @click.option("--view", type=click.IntRange(min=0), help="Number of a camera in the scene's file  [default: the first]")
-@click.option("--frames", type=click.IntRange(min=1), help="Draw so many pictures of an animated scene, as "
-              "NAME-0000.png and so on")
+@click.option("--frames", type=click.IntRange(min=1), help="Draw so many pictures of an animated scene: "
+              "NAME-0000.png and so on, and an animation, NAME.png or NAME.gif; a report has a list")
 @click.option("--shading", type=click.Choice(SHADINGS), default="simple", show_default=True, help="simple: colour "
               "times cosine; full: lights, shadows, textures, reflection, refraction")
 @click.option("--depth", type=click.IntRange(0, MAX_DEPTH), help="Generations of secondary rays of full shading  "
@@ -70,10 +67,12 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
            parameters, latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
     """Draw SCENE: an .obj, .ply, .ply.gz, .gltf or .glb file, or a built-in one: room, mirror-room, vpl, walk or
     sunflowers."""
-    config = chip_config(fmt, parameters)
     _check_shading(engine, shading, depth, sky, hits)
-    _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames, hits)
+    order = Order(engine=engine, size=size, config=chip_config(fmt, parameters), shading=shading,
+                  depth=4 if depth is None else depth, background=background, latency=latency, jitter=jitter,
+                  seed=seed, wave=wave, wave_cycles=wave_cycles, wave_pixels=wave_pixels)
     output = output or Path(f"{Path(scene).name.split('.')[0]}.png")
+    _check_options(order, output, frames, hits)
     for path in (output, wave, hits, report):
         if path is not None and not path.parent.is_dir():
             raise BadInput(f"{path}: there is no folder {path.parent}")
@@ -85,42 +84,49 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
             loaded = replace(loaded, sky=_panorama(sky, chosen))
         if frames and not loaded.is_animated:
             raise BadInput(f"{scene}: nothing moves in this scene; leave --frames out")
+        times = [0.0] if not frames else [loaded.duration * k / frames for k in range(frames)]
+        durations = frame_durations(frames, loaded.duration, is_gif=_is_gif(output)) if frames else []
         compiled = None
-        if engine != "golden" or (shading == "simple" and check):
-            with _progress(console, "building kd-trees"):
-                compiled = CompiledScene(loaded, fmt=fmt, stack_depth=config.stack_depth,
-                                         index_width=config.index_width, flatten=flatten)
+        if engine != "golden":
+            with progress_on(console, "building kd-trees"):
+                compiled = CompiledScene(loaded, fmt=fmt, stack_depth=order.config.stack_depth,
+                                         index_width=order.config.index_width, flatten=flatten)
         for warning in [*loaded.warnings, *(compiled.warnings if compiled else [])]:
             console.print(f"warning: {warning}", markup=False)
-        wave_file = files.enter_context(written_whole(wave)) if wave else None
+        if wave:
+            order = replace(order, wave=files.enter_context(written_whole(wave)))
 
-        times = [0.0] if not frames else [loaded.duration * k / frames for k in range(frames)]
+        poses = [(posed, chosen if camera is not None else _camera(posed, None, view))
+                 for posed in map(loaded.at_time, times)]
+        chip = order.config if compiled is None else order.chip_for(compiled)
         drawn = []
-        for number, at in enumerate(times):
-            posed = loaded.at_time(at)
-            view_now = chosen if camera is not None else _camera(posed, None, view)
-            frame, image, chip = _draw(engine, posed, compiled, view_now, size, config, background, shading, depth,
-                                       latency, jitter, seed, wave_file, wave_cycles, wave_pixels, console)
-            _describe(frame, engine, scene, size, chip)
+        for number, (frame, image) in enumerate(draw(order, compiled, poses, is_moving=bool(frames), console=console)):
+            _describe(frame, order, scene, chip)
+            if frames:
+                frame.report["time"] = times[number]
             if check:
-                _compare(frame, engine, posed, image, view_now, size, chip, background, shading, depth)
-            name = output if not frames else output.with_name(f"{output.stem}-{number:04d}{output.suffix}")
+                _compare(frame, order, *poses[number], image, chip)
+            name = output if not frames else output.with_name(f"{output.stem}-{number:04d}.png")
             drawn.append((name, frame))
             _print_summary(console, name, frame)
-        # All is drawn; from here on files appear.
+        # All is drawn; from here on files appear, and only if all of them can be written.
         for name, frame in drawn:
-            with written_whole(name) as path:
-                Image.fromarray(frame.color).save(path, format="PNG")
+            save_picture(files.enter_context(written_whole(name)), frame.color)
+        if frames:
+            save_animation(files.enter_context(written_whole(output)), [frame.color for _, frame in drawn], durations)
         if hits:
             frame = drawn[0][1]
-            with written_whole(hits) as path:
-                with open(path, "wb") as file:
-                    np.savez_compressed(file, instance_id=frame.instance_id, prim_id=frame.prim_id, t=frame.t,
-                                        u=frame.u, v=frame.v)
+            with open(files.enter_context(written_whole(hits)), "wb") as file:
+                np.savez_compressed(file, instance_id=frame.instance_id, prim_id=frame.prim_id, t=frame.t, u=frame.u,
+                                    v=frame.v)
         if report:
             reports = [frame.report for _, frame in drawn]
-            with written_whole(report) as path:
-                path.write_text(json.dumps(reports if frames else reports[0], indent=1) + "\n")
+            files.enter_context(written_whole(report)).write_text(
+                json.dumps(reports if frames else reports[0], indent=1) + "\n")
+
+
+def _is_gif(path):
+    return path.suffix.lower() == ".gif"
 
 
 def _check_shading(engine, shading, depth, sky, hits):
@@ -133,12 +139,16 @@ def _check_shading(engine, shading, depth, sky, hits):
         raise click.UsageError("--sky is of full shading; use --shading full")
 
 
-def _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames, hits):
-    width, height = size
-    if max(size) >= 1 << config.coord_width:
+def _check_options(order, output, frames, hits):
+    (width, height), config, engine, wave = order.size, order.config, order.engine, order.wave
+    if max(order.size) >= 1 << config.coord_width:
         raise click.UsageError(f"--size: {width}x{height} is too large for a chip with coord_width = "
                                f"{config.coord_width}, which draws up to {(1 << config.coord_width) - 1} pixels a side")
-    if wave is None and (wave_cycles or wave_pixels):
+    if _is_gif(output) and not frames:
+        raise click.UsageError(f"-o: {output.name} would be an animation; give --frames, or a name that ends in .png")
+    if not _is_gif(output) and output.suffix.lower() != ".png":
+        raise click.UsageError(f"-o: {output.name} must end in .png{', or .gif' if frames else ''}")
+    if wave is None and (order.wave_cycles or order.wave_pixels):
         raise click.UsageError("--wave-cycles and --wave-pixel need --wave FILE")
     if wave is not None:
         if engine not in ("rtl", "pysim"):
@@ -146,11 +156,11 @@ def _check_options(engine, size, config, wave, wave_cycles, wave_pixels, frames,
         kinds = (".vcd", ".fst") if engine == "rtl" else (".vcd",)
         if wave.suffix.lower() not in kinds:
             raise click.UsageError(f"--wave: {wave.name} must end in {' or '.join(kinds)} with --engine {engine}")
-        if engine == "pysim" and (wave_cycles or wave_pixels):
+        if engine == "pysim" and (order.wave_cycles or order.wave_pixels):
             raise click.UsageError("--wave-cycles and --wave-pixel work with --engine rtl only")
-        if frames and frames > 1:
+        if frames:
             raise click.UsageError("--wave shows one picture; leave --frames out")
-    for x, y in wave_pixels:
+    for x, y in order.wave_pixels:
         if x >= width or y >= height:
             raise click.UsageError(f"--wave-pixel: {x},{y} is outside of the picture of {width}x{height}")
     if hits is not None and frames and frames > 1:
@@ -178,70 +188,27 @@ def _panorama(path, camera):
     return Sky.from_panorama(decode_texture(data, str(path), []).pixels, up=up)
 
 
-@contextlib.contextmanager
-def _progress(console, what):
-    if not sys.stderr.isatty():
-        yield lambda text: None
-        return
-    with console.status(what) as status:
-        yield lambda text: status.update(text)
-
-
-def _draw(engine, scene, compiled, camera, size, config, background, shading, depth, latency, jitter, seed, wave,
-          wave_cycles, wave_pixels, console):
-    """The frame, the image that the engine had of the scene, if any, and the chip, with a shader if it needs one."""
-    begin = time.perf_counter()
-    image = None
-    with _progress(console, f"drawing by {engine}") as progress:
-        if engine == "golden":
-            frame = render_golden(scene, camera, *size, background=background, shading=shading, depth=_depth(depth))
-        else:
-            eye = camera.eye if shading == "full" else None
-            image = compiled.image(scene, eye=eye, background=background)
-            if shading == "full":
-                # A shader that does what the scene needs, and no more.
-                config = replace(config, shader=replace(image.needs, depth=_depth(depth)))
-            common = dict(config=config, background=background)
-            if shading == "full" and engine == "model":
-                frame = render_full(image, camera, *size, config=config)
-            elif engine == "model":
-                frame = render_model(image, camera, *size, **common)
-            elif engine == "rtl":
-                frame = render_rtl(image, camera, *size, **common, latency=latency, jitter=jitter, seed=seed, wave=wave,
-                                   cycles=wave_cycles, pixels=wave_pixels, progress=progress)
-            else:
-                frame = render_pysim(image, camera, *size, **common, latency=latency, wave=wave, progress=progress)
-            frame.report["memory"] = {**image.stats, "bytes": image.num_bytes, "crc32": f"{image.checksum:08x}"}
-    frame.report["seconds"] = time.perf_counter() - begin
-    return frame, image, config
-
-
-def _depth(depth):
-    return 4 if depth is None else depth
-
-
-def _describe(frame, engine, scene, size, config):
+def _describe(frame, order, scene, config):
     parameters = asdict(config)
     del parameters["fmt"]
-    frame.report.update(engine=engine, scene=str(scene), size=list(size), format=str(config.fmt), config=parameters)
+    frame.report.update(engine=order.engine, scene=str(scene), size=list(order.size), format=str(config.fmt),
+                        config=parameters)
 
 
-def _compare(frame, engine, scene, image, camera, size, config, background, shading, depth):
-    if size[0] * size[1] > _CHECKED_PIXELS:
+def _compare(frame, order, scene, camera, image, config):
+    if order.size[0] * order.size[1] > _CHECKED_PIXELS:
         return
-    if engine in ("rtl", "pysim"):
-        if shading == "full":
-            model = render_full(image, camera, *size, config=config)
-            differs = (frame.color != model.color).any(axis=-1)
-        else:
-            model = render_model(image, camera, *size, config=config, background=background)
-            differs = frame.differs(model)
+    has_clock = order.engine in ("rtl", "pysim")
+    if has_clock:
+        model = model_picture(order, image, camera, config)
+        differs = (frame.color != model.color).any(axis=-1) if order.is_full else frame.differs(model)
         frame.report["wrong_pixels_vs_model"] = int(differs.sum())
         frame.report.update({name: model.report[name] for name in ("counts", "ray_kinds") if name in model.report})
-    if engine != "golden":
-        golden = render_golden(scene, camera, *size, background=background, shading=shading, depth=_depth(depth))
+    if order.engine != "golden":
+        golden = render_golden(scene, camera, *order.size, background=order.background, shading=order.shading,
+                               depth=order.depth)
         # A chip with full shading keeps no hits; its model does.
-        surface = model if shading == "full" and engine in ("rtl", "pysim") else frame
+        surface = model if order.is_full and has_clock else frame
         frame.report["wrong_pixels_vs_golden"] = int(surface.differs_in_surface(golden).sum())
         frame.report["psnr_vs_golden"] = psnr(frame.color, golden.color)
 
@@ -253,6 +220,10 @@ def _print_summary(console, name, frame):
     if "cycles" in report:
         parts.append(f"{report['cycles']:,} cycles, {report['cycles_per_ray']:.2f} a ray, "
                      f"{report['simulated_hz'] / 1e3:.0f} kHz")
+    if "upload" in report:
+        upload = report["upload"]
+        rate = f", {upload['bytes_per_cycle']:.2g} a cycle of the last frame" if "bytes_per_cycle" in upload else ""
+        parts.append(f"{upload['bytes']:,} bytes uploaded{rate}")
     if "wrong_pixels_vs_model" in report:
         parts.append(f"{report['wrong_pixels_vs_model']} pixels differ from the model")
     if "wrong_pixels_vs_golden" in report:

@@ -3,6 +3,7 @@
 from .bench import HangError, SimulationError
 from .build import BuildError
 from .machine import render_rtl
+from .moving import render_frames
 from .pysim import render_pysim
 
-__all__ = ["BuildError", "HangError", "SimulationError", "render_pysim", "render_rtl"]
+__all__ = ["BuildError", "HangError", "SimulationError", "render_frames", "render_pysim", "render_rtl"]

@@ -93,12 +93,26 @@ class Bench:
         self._library.bench_memory(self._bench, MEMORIES.index(name), _array(padded, c_uint32),
                                    c_uint64(padded.size), c_uint32(words_at_once))
 
+    def write(self, name, first, words):
+        """Changes words of a memory that is loaded, from the word numbered ``first`` on.
+
+        Raises
+        ------
+        SimulationError
+            If they do not all lie in the memory.
+        """
+        memory, words = self._memories.get(name, np.empty(0)), np.ravel(words)
+        if not 0 <= first <= memory.size - words.size:
+            raise SimulationError(f"words {first} to {first + words.size - 1} are not all in the memory '{name}', "
+                                  f"which has {memory.size}")
+        memory[first:first + words.size] = words
+
     def trace(self, path, *, first=0, last=1 << 62):
         """Writes a waveform of the cycles from ``first`` to before ``last``, counted from now."""
         if not self._library.bench_trace(self._bench, str(path).encode(), c_uint64(first), c_uint64(last)):
             raise SimulationError(f"waveform {path} cannot be opened")
 
-    def draw(self, *, camera, root, width, height, background, max_cycles=1 << 40, hang_cycles=20_000):
+    def draw(self, *, camera, root, width, height, background, max_cycles=1 << 40, hang_cycles=None):
         """Draws one picture.
 
         Returns
@@ -111,7 +125,8 @@ class Bench:
         Raises
         ------
         HangError
-            If no unit took anything in for ``hang_cycles`` cycles.
+            If no unit took anything in for ``hang_cycles`` cycles. Default: 20,000, and 200,000 of a chip with a shader,
+            in which all rays may be at work for long before any of them is traced.
         SimulationError
             If an assertion of the chip fails, it reads beyond a memory or writes beyond the picture, or the
             picture takes more than ``max_cycles``.
@@ -119,6 +134,7 @@ class Bench:
             If the user interrupts.
         """
         library, config = self._library, self._config
+        hang_cycles = hang_cycles or (20_000 if config.shader is None else 200_000)
         layout = pixel_layout(fmt=config.fmt, index_width=config.index_width, coord_width=config.coord_width)
         words = -(-layout.size // 32)
         pixels = np.zeros((height, width, words), np.uint32)

@@ -13,7 +13,7 @@ from ..model.model import camera_rows
 from ..scene.triangles import pack_fields
 from .bench import Bench
 
-__all__ = ["camera_words", "decode_pixels", "memory_words", "render_rtl", "report_of"]
+__all__ = ["camera_words", "decode_pixels", "draw_frame", "load_image", "memory_words", "render_rtl", "report_of"]
 
 _UNITS = ("traversal", "list", "transformation", "intersection", "shader")
 
@@ -25,11 +25,13 @@ def camera_words(image, camera, width):
     return pack_fields(image.fmt.encode(origin_first).reshape(1, -1), image.fmt.width)[0]
 
 
+#: Where the memories of full shading lie in an image, by the chip's names.
+_FULL = {"shading": "records", "textures": "texels"}
+
+
 def memory_words(image, name, config):
     """What a chip finds in its memory ``name``."""
-    if config.shader is not None:
-        name = {"shading": "records", "textures": "texels"}.get(name, name)
-    return getattr(image, name)
+    return getattr(image, name if config.shader is None else _FULL.get(name, name))
 
 
 def _field(words, low, width):
@@ -116,24 +118,42 @@ def render_rtl(image, camera, width, height, *, config, background=(0, 0, 0), la
 
     def draw(trace, path=None, window=None):
         with Bench(config, latency=latency, jitter=jitter, seed=seed, trace=trace, progress=progress) as bench:
-            for name in memory_ports(config):
-                bench.load(name, memory_words(image, name, config))
+            load_image(bench, image, config)
             if path is not None:
                 first, last = window or (0, 1 << 62)
                 bench.trace(path, first=first, last=last)
             progress("drawing")
-            begin, cycle = time.perf_counter(), bench.cycle
-            red, green, blue = background
-            drawn = bench.draw(camera=camera_words(image, camera, width), root=image.root, width=width,
-                               height=height, background=red << 16 | green << 8 | blue)
-            rate = (bench.cycle - cycle) / (time.perf_counter() - begin)
-            return *drawn, bench.counters, bench.bytes_read, rate
+            return draw_frame(bench, image, camera, width, height, config=config, background=background)
 
     if pixels:
         # Where in time a pixel is at work is known only afterwards; the second run is the same as the first.
-        _, written, begun, *_ = draw(trace)
+        _, written, begun = draw(trace)
         cycles = wave_window(begun, written, pixels, width, height)
-    raw, _, _, counters, bytes_read, rate = draw(trace, wave, cycles)
+    return draw(trace, wave, cycles)[0]
+
+
+def load_image(bench, image, config):
+    """Puts an image into an open bench's memories."""
+    for name in memory_ports(config):
+        bench.load(name, memory_words(image, name, config))
+
+
+def draw_frame(bench, image, camera, width, height, *, config, background=(0, 0, 0)):
+    """What the chip of an open bench draws of the image in its memories.
+
+    Returns
+    -------
+    frame : Frame
+        As of :func:`render_rtl`.
+    written, begun
+        As of :meth:`~sim.machine.bench.Bench.draw`.
+    """
+    begin, cycle, read = time.perf_counter(), bench.cycle, bench.bytes_read
+    red, green, blue = background
+    raw, written, begun = bench.draw(camera=camera_words(image, camera, width), root=image.root, width=width,
+                                     height=height, background=red << 16 | green << 8 | blue)
+    rate = (bench.cycle - cycle) / (time.perf_counter() - begin)
     frame = decode_pixels(raw, image, config)
-    frame.report.update(report_of(counters, bytes_read, width * height, rate, config))
-    return frame
+    bytes_read = {name: number - read[name] for name, number in bench.bytes_read.items()}
+    frame.report.update(report_of(bench.counters, bytes_read, width * height, rate, config))
+    return frame, written, begun

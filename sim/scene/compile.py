@@ -1,85 +1,39 @@
 """The scene compiler: from a scene to the chip's memory image."""
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from rtl.microcode import lane_width
+from rtl.program.records import FIRST_MATRIX
 
 from .error import SceneError
-from .image import AXIS_SHIFT, INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, SOLID_ENTRY, UPPER_EMPTY, SceneImage
-from .kdtree import LEAF, build_kdtree
-from .shading_image import needed_features, shading_records
-from .triangles import pack_fields, unit_triangle_maps
+from .image import INSTANCE_ENTRY, SOLID_ENTRY, SceneImage, tree_words
+from .parts import color_words, make_part
+from .shading_image import frame_records, needed_features, num_lights, shading_records
+from .slots import MemoryLayout, Piece, SceneUpdate
+from .top_level import top_level, unit_box
+from .triangles import pack_fields
 
 __all__ = ["CompiledScene", "compile_scene"]
 
-# Bounds are widened by so many units in the last place of 1, the order of all coordinates: the error of
-# t = (split − O) / D for rays that come from about as far as the scene is wide.
-_PAD_ULP = 2
-
-# Cost of one more primitive in a leaf when a kd-step costs 1. The units work side by side, so what counts is that
-# none waits for another, not the five cycles that a triangle takes in the transformation.
-_TRIANGLE_COST = 2.0
-_INSTANCE_COST = 25.0
-
-# Part of the cost taken off a split that cuts off empty space: the best of 0.05…0.4 over room, simple room and
-# conference; greater ones give fewer but far fuller leaves.
-_EMPTY_BONUS = 0.1
+# Room in a slot for the top-level tree, over what the tree of the scene as compiled needs.
+_HEADROOM = 2
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
-    """A mesh, or all meshes of a flattened scene, in coordinates of order 1."""
+class _Static:
+    """An image in which nothing that moves is there yet."""
 
-    name: str
-    corners: np.ndarray
-    instance: np.ndarray
-    prim: np.ndarray
-    material: np.ndarray
-    rows: np.ndarray
-    centers: np.ndarray
-    tree: object
-
-    @cached_property
-    def box(self):
-        """float64[2, 3]: lower and upper bounds."""
-        return np.array([self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))])
+    layout: MemoryLayout
+    background: tuple
+    image: SceneImage
+    first_light: int
 
 
-def _unit_box(lower, upper):
-    """Center, and the power of two that brings the box within [−1, 1]; so scaling is exact."""
-    half = float(np.max(upper - lower)) / 2
-    return (lower + upper) / 2, 2.0 ** -math.ceil(math.log2(half)) if half > 0 else 1.0
-
-
-def _color_words(materials):
-    linear = np.clip([material.base_color for material in materials], 0.0, 1.0)
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    red, green, blue = np.rint(255 * encoded).astype(np.uint32).T
-    return red << 16 | green << 8 | blue
-
-
-def _make_part(name, corners, instance, prim, material, normal_scale, *, fmt, stack_depth, warnings):
-    corners = fmt.quantize(corners)
-    rows, centers, usable = unit_triangle_maps(corners, normal_scale=normal_scale)
-    if not usable.all():
-        warnings.append(f"mesh '{name}': {np.count_nonzero(~usable)} triangles dropped that have no area once their "
-                        f"vertices are rounded to format {fmt}")
-    corners, instance, prim, material, rows, centers = (
-        array[usable] for array in (corners, instance, prim, material, rows, centers))
-    overflow = ~np.isfinite(fmt.quantize(rows)).all(axis=(1, 2))
-    if overflow.any():
-        worst = np.flatnonzero(overflow)[0]
-        raise SceneError(f"mesh '{name}', triangle {prim[worst]}: its transform has values up to "
-                         f"{np.abs(rows[worst]).max():.3g}, beyond {fmt.max:.3g}, the largest of format {fmt}; "
-                         f"choose a format with more exponent bits ({overflow.sum()} such triangles)")
-    tree = build_kdtree(corners.min(axis=1), corners.max(axis=1), triangles=corners, frac_width=fmt.frac_width,
-                        min_normal=fmt.min_normal, pad=_PAD_ULP * 2.0 ** -fmt.frac_width,
-                        intersection_cost=_TRIANGLE_COST, empty_bonus=_EMPTY_BONUS, max_depth=stack_depth)
-    return _Part(name, corners, instance, prim, material, rows, centers, tree)
+def _even(number):
+    return number + number % 2
 
 
 class CompiledScene:
@@ -106,6 +60,7 @@ class CompiledScene:
     """
 
     def __init__(self, scene, *, fmt, stack_depth=32, index_width=24, flatten=None):
+        self._scene = scene
         self._fmt = fmt
         self._stack_depth = stack_depth
         self._index_width = index_width
@@ -113,18 +68,22 @@ class CompiledScene:
         if flatten is None:
             flatten = not scene.is_animated and len({i.mesh for i in scene.instances}) == len(scene.instances)
         self.is_flat = flatten
-        self._colors = _color_words(scene.materials)
+        self._colors = color_words(scene.materials)
         self._solid = np.array([material.alpha_mode == "opaque" and round(255 * material.transmission) == 0
                                 for material in scene.materials])
         self._parts = []
         self._spaces = []
+        self._shown = []
+        self._kept = {}
         common = dict(fmt=fmt, stack_depth=stack_depth, warnings=self.warnings)
         if flatten:
-            self.center, self.scale = _unit_box(*scene.bounds())
+            self.center, self.scale = unit_box(*scene.bounds())
             self._parts.append(self._flat_part(scene, common))
         else:
             for mesh in scene.meshes:
                 self._parts.append(self._mesh_part(scene, mesh, common))
+            self._shown = [number for number, placed in enumerate(scene.instances)
+                           if self._parts[placed.mesh] is not None]
 
     def _flat_part(self, scene, common):
         corners, instance, prim, material = [], [], [], []
@@ -137,7 +96,7 @@ class CompiledScene:
             instance.append(np.full(len(usable), number, np.int32))
             prim.append(usable.astype(np.int32))
             material.append(mesh.material_ids[usable])
-        part = _make_part("scene" if len(scene.instances) > 1 else scene.instances[0].name,
+        part = make_part("scene" if len(scene.instances) > 1 else scene.instances[0].name,
                           np.concatenate(corners), np.concatenate(instance), np.concatenate(prim),
                           np.concatenate(material), 1 / self.scale, **common)
         # The front of a triangle is where it is in its mesh's space.
@@ -152,14 +111,28 @@ class CompiledScene:
         if not len(usable) or not scales:
             self._spaces.append(None)
             return None
-        center, scale = _unit_box(*mesh.bounds())
+        center, scale = unit_box(*mesh.bounds())
         self._spaces.append((center, scale))
         corners = (mesh.vertices[mesh.triangles[usable]] - center) * scale
         # D′z shall be the cosine in the world; all instances of a mesh share a matrix, hence their mean size.
-        return _make_part(mesh.name, corners, np.full(len(usable), -1, np.int32), usable.astype(np.int32),
+        return make_part(mesh.name, corners, np.full(len(usable), -1, np.int32), usable.astype(np.int32),
                           mesh.material_ids[usable], float(np.mean(scales)) / scale, **common)
 
-    def image(self, scene, *, eye=None, background=(0, 0, 0)):
+    @cached_property
+    def slots(self):
+        """The :class:`~sim.scene.slots.MemoryLayout` with two slots: twice what the scene as compiled needs."""
+        if self.is_flat:
+            return MemoryLayout(2, 0, 0, 0)
+        first, count = self._top_level(self._scene), len(self._shown)
+        return MemoryLayout(2, count, _even(max(_HEADROOM * first.num_nodes, 2 * count)),
+                            max(_HEADROOM * first.num_entries, 2 * count))
+
+    @property
+    def needs(self):
+        """The least :class:`~rtl.program.features.ShaderFeatures` that draw all that is in the scene."""
+        return needed_features(self._scene, instances=not self.is_flat)
+
+    def image(self, scene, *, eye=None, background=(0, 0, 0), slot=None):
         """The memory image with the instances where ``scene`` has them.
 
         Parameters
@@ -171,40 +144,107 @@ class CompiledScene:
             there.
         background : tuple of int
             Of full shading: sRGB-encoded bytes that rays see that hit nothing.
+        slot : int, optional
+            0 or 1: an image in which what moves lies in that one of two slots, the other being empty, so that
+            :meth:`update` can go on from there. Default: an image without slots.
 
         Raises
         ------
         SceneError
-            If an instance's transform does not fit the format, or the image the memory.
+            If an instance's transform does not fit the format, the image does not fit the memory, or instances move
+            of a scene that is flat.
         """
-        fmt = self._fmt
-        shown = [] if self.is_flat else [
-            number for number, placed in enumerate(scene.instances) if self._parts[placed.mesh] is not None]
-        num_instances = len(shown)
-        first_tree = num_instances + num_instances % 2
-        node_words, list_words, bases = [], [], []
-        node_base, list_base = first_tree, 0
-        matrix_base = num_instances
-        matrices, shading, of_instance, of_prim, shaded = [], [], [], [], []
+        top = self._top_level(scene, slotted=slot is not None)
+        layout = self.slots if slot is not None else MemoryLayout(
+            1, len(self._shown), top.num_nodes if top else 0, top.num_entries if top else 0)
+        static = self._static(layout, eye is not None, background)
+        return static.image.updated(self._update(scene, top, static, slot or 0, eye))
+
+    def update(self, scene, *, slot, eye=None):
+        """What has to be uploaded for a frame, to a memory with an image that has slots.
+
+        Parameters
+        ----------
+        scene, eye
+            As for :meth:`image`.
+        slot : int
+            0 or 1; the frame that is being drawn has the other.
+
+        Returns
+        -------
+        SceneUpdate
+
+        Raises
+        ------
+        SceneError
+            As :meth:`image`.
+        """
+        static = self._static(self.slots, eye is not None, None)
+        return self._update(scene, self._top_level(scene, slotted=True), static, slot, eye)
+
+    def _top_level(self, scene, *, slotted=False):
+        """The frame's top level, None of a flat scene."""
         if self.is_flat:
-            center, scale = self.center, self.scale
-        else:
-            center, scale = _unit_box(*scene.bounds())
-            instance_maps, boxes = self._place(scene, shown, center, scale)
-            matrices.append(instance_maps)
-            shading.append(np.zeros(num_instances, np.uint32))
-            of_instance.append(np.full(num_instances, -1, np.int32))
-            of_prim.append(np.full(num_instances, -1, np.int32))
-            top = build_kdtree(boxes[:, 0], boxes[:, 1], frac_width=fmt.frac_width, min_normal=fmt.min_normal,
-                               pad=_PAD_ULP * 2.0 ** -fmt.frac_width, intersection_cost=_INSTANCE_COST,
-                               empty_bonus=_EMPTY_BONUS, max_depth=self._stack_depth)
-            nodes, entries = self._tree_words(top, node_base, list_base, INSTANCE_ENTRY, None, 0)
-            node_words.append(nodes)
-            list_words.append(entries)
-            node_base += len(nodes)
-            list_base += len(entries)
+            for before, now in zip(self._scene.instances, scene.instances, strict=True):
+                if not np.allclose(before.transform, now.transform, rtol=1e-12, atol=1e-12):
+                    raise SceneError(f"instance '{now.name}' moves, but the scene is flat: all triangles lie in one "
+                                     "space; compile it with flatten=False (dynrt: --instances)")
+            return None
+        room = (self.slots.top_nodes, self.slots.top_entries) if slotted else None
+        return top_level(scene, shown=self._shown, boxes=[part and part.box for part in self._parts],
+                         spaces=self._spaces, fmt=self._fmt, max_depth=self._stack_depth, room=room)
+
+    def _update(self, scene, top, static, slot, eye):
+        layout, ahead, between = static.layout, [], []
+        center, scale, maps = (self.center, self.scale, np.empty((0, 4, 3))) if top is None else (
+            top.center, top.scale, top.maps)
+        if top is not None:
+            first = layout.first_instance(slot)
+            nodes, entries = tree_words(
+                top.tree, fmt=self._fmt, first_node=layout.first_node(slot), first_entry=layout.first_entry(slot),
+                items=top.tree.items + first, kinds=INSTANCE_ENTRY)
+            fields = self._fmt.encode(maps).reshape(-1, 12)
+            ahead += [Piece("nodes", layout.first_node(slot), nodes),
+                      Piece("lists", layout.first_entry(slot), entries),
+                      Piece("matrices", first, pack_fields(fields, self._fmt.width))]
+        if eye is not None:
+            count = num_lights(scene)
+            if count != num_lights(self._scene):
+                raise SceneError(f"scene has {count} lights, but had {num_lights(self._scene)} when it was compiled; "
+                                 "compile it anew")
+            first_light = static.first_light + slot * count
+            records = frame_records(scene, fmt=self._fmt, center=center, scale=scale, maps=maps,
+                                    first_light=first_light, eye=eye)
+            instances, lights, about = (pack_fields(fields, lane_width(self._fmt)) for fields in records)
+            if len(instances):
+                ahead.append(Piece("records", FIRST_MATRIX + layout.first_instance(slot), instances))
+            ahead.append(Piece("records", first_light, lights))
+            between.append(Piece("records", 0, about))
+        depths = [part.tree.max_depth for part in self._parts if part is not None]
+        return SceneUpdate(
+            slot=slot, root=layout.static_node if top is None else layout.first_node(slot), center=center,
+            scale=scale, stack_depth=max(depths + ([] if top is None else [top.tree.max_depth])),
+            ahead=tuple(ahead), is_cut=top is not None and top.is_cut, between=tuple(between))
+
+    def _static(self, layout, is_full, background):
+        """All that does not move; of memories with slots kept, as it is wanted again for each frame."""
+        known = self._kept.get(is_full)
+        if known and known.layout == layout and background in (None, known.background):
+            return known
+        static = self._make_static(layout, is_full, background or (0, 0, 0))
+        if layout.num_slots > 1:
+            self._kept[is_full] = static
+        return static
+
+    def _make_static(self, layout, is_full, background):
+        fmt, count = self._fmt, layout.static_matrix
+        node_words, list_words = [np.zeros((layout.static_node, 2), np.uint32)], [
+            np.zeros(layout.static_entry, np.uint32)]
+        matrices, shading = [np.zeros((count, 4, 3))], [np.zeros(count, np.uint32)]
+        of_instance, of_prim = [np.full(count, -1, np.int32)], [np.full(count, -1, np.int32)]
+        first_node, first_entry, first_matrix = layout.static_node, layout.static_entry, layout.static_matrix
+        roots, shaded = {}, []
         for number, part in enumerate(self._parts):
-            bases.append(node_base)
             if part is None:
                 continue
             # Matrices in the order in which leaves name them first: what is tested together lies together.
@@ -212,96 +252,53 @@ class CompiledScene:
             order = order[np.argsort(first)]
             place = np.full(len(part.corners), -1, np.int64)
             place[order] = np.arange(len(order))
-            kinds = np.where(self._solid[part.material], SOLID_ENTRY, 0)[part.tree.items]
-            nodes, entries = self._tree_words(part.tree, node_base, list_base, kinds, place, matrix_base)
+            nodes, entries = tree_words(
+                part.tree, fmt=fmt, first_node=first_node, first_entry=first_entry,
+                items=place[part.tree.items] + first_matrix,
+                kinds=np.where(self._solid[part.material], SOLID_ENTRY, 0)[part.tree.items])
+            roots[number] = nodes[0]
             node_words.append(nodes)
             list_words.append(entries)
-            node_base += len(nodes)
-            list_base += len(entries)
-            shaded += self._shaded(scene, number, order, matrix_base)
-            matrix_base += len(order)
+            shaded += self._shaded(number, order, first_matrix)
             matrices.append(np.concatenate([part.rows[order], part.centers[order, None]], axis=1))
             shading.append(self._colors[part.material[order]])
             of_instance.append(part.instance[order])
             of_prim.append(part.prim[order])
-        starts = np.zeros((first_tree, 2), np.uint32)
-        by_base = dict(zip(bases, [words for words in node_words[0 if self.is_flat else 1:]], strict=False))
-        for slot, number in enumerate(shown):
-            starts[slot] = by_base[bases[scene.instances[number].mesh]][0]
-        nodes = np.concatenate([starts, *node_words])
-        lists = np.concatenate(list_words)
+            first_node, first_entry, first_matrix = (
+                first_node + len(nodes), first_entry + len(entries), first_matrix + len(order))
+        for slot in range(layout.num_slots):
+            for instance, number in enumerate(self._shown, layout.first_instance(slot)):
+                node_words[0][instance] = roots[self._scene.instances[number].mesh]
+        nodes, lists = np.concatenate(node_words), np.concatenate(list_words)
         fields = fmt.encode(np.concatenate(matrices)).reshape(-1, 12)
         limit = 1 << self._index_width
-        for name, count in (("kd-tree nodes", len(nodes)), ("list entries", len(lists)), ("matrices", len(fields))):
-            if count > limit:
-                raise SceneError(f"scene needs {count:,} {name}, more than the {limit:,} that the chip's memory "
+        for name, words in (("kd-tree nodes", nodes), ("list entries", lists), ("matrices", fields)):
+            if len(words) > limit:
+                raise SceneError(f"scene needs {len(words):,} {name}, more than the {limit:,} that the chip's memory "
                                  f"addresses; leave objects out or build a chip with a wider index_width")
         image = SceneImage(
-            fmt=fmt, root=first_tree, nodes=nodes, lists=lists, matrices=pack_fields(fields, fmt.width),
-            shading=np.concatenate(shading), num_instances=num_instances,
-            stack_depth=max([part.tree.max_depth for part in self._parts if part is not None]
-                            + ([] if self.is_flat else [top.max_depth])),
+            fmt=fmt, root=0, nodes=nodes, lists=lists, matrices=pack_fields(fields, fmt.width),
+            shading=np.concatenate(shading), num_instances=count, stack_depth=0,
             triangle_instance=np.concatenate(of_instance), triangle_prim=np.concatenate(of_prim),
-            instance_ids=np.array(shown, np.int32), center=center, scale=scale,
+            instance_ids=np.tile(np.array(self._shown, np.int32), layout.num_slots), center=np.zeros(3), scale=1.0,
             stats={"nodes": len(nodes), "list_entries": len(lists), "matrices": len(fields)})
-        if eye is None:
-            return image
-        records, texels = shading_records(scene, image, parts=shaded, eye=eye, background=background)
-        return replace(image, records=pack_fields(records, lane_width(fmt)), texels=texels,
-                       needs=needed_features(scene, instances=not self.is_flat),
-                       stats={**image.stats, "records": len(records), "texels": len(texels)})
+        if not is_full:
+            return _Static(layout, background, image, 0)
+        records, texels, first_light = shading_records(self._scene, image, parts=shaded, background=background,
+                                                       num_slots=layout.num_slots)
+        image = replace(image, records=pack_fields(records, lane_width(fmt)), texels=texels,
+                        needs=self.needs,
+                        stats={**image.stats, "records": len(records), "texels": len(texels)})
+        return _Static(layout, background, image, first_light)
 
-    def _shaded(self, scene, number, order, matrix_base):
+    def _shaded(self, number, order, first_matrix):
         """What :func:`~.shading_image.shading_records` wants to know of a part's triangles."""
-        part, numbers = self._parts[number], matrix_base + np.arange(len(order))
+        part, numbers, scene = self._parts[number], first_matrix + np.arange(len(order)), self._scene
         if not self.is_flat:
             return [(scene.meshes[number], numbers, part.prim[order], None)]
         of = part.instance[order]
         return [(scene.meshes[placed.mesh], numbers[of == k], part.prim[order][of == k], placed.transform[:, :3])
                 for k, placed in enumerate(scene.instances)]
-
-    def _place(self, scene, shown, center, scale):
-        """Matrices of instances from the scene's into their meshes' space, and their boxes in the scene's."""
-        fmt = self._fmt
-        maps, boxes = np.empty((len(shown), 4, 3)), np.empty((len(shown), 2, 3))
-        for slot, number in enumerate(shown):
-            placed = scene.instances[number]
-            part = self._parts[placed.mesh]
-            mesh_center, mesh_scale = self._spaces[placed.mesh]
-            linear = placed.transform[:, :3]
-            middle = (linear @ mesh_center + placed.transform[:, 3] - center) * scale
-            inverse = np.linalg.inv(linear) * (mesh_scale / scale)
-            maps[slot, :3] = fmt.quantize(inverse)
-            maps[slot, 3] = fmt.quantize(middle)
-            if not np.isfinite(maps[slot]).all() or np.linalg.matrix_rank(maps[slot, :3]) < 3:
-                raise SceneError(f"instance '{placed.name}': its transform does not fit format {fmt}, whose values "
-                                 f"are from {fmt.min_normal:.3g} to {fmt.max:.3g}; choose a format with more exponent "
-                                 "bits, or scale the instance less")
-            # The chip's map is the rounded one, so the box is that of its inverse.
-            which = np.indices((2, 2, 2)).reshape(3, 8).T
-            world = np.take_along_axis(part.box, which, axis=0) @ np.linalg.inv(maps[slot, :3]).T + maps[slot, 3]
-            # What the transformed ray is off by in the mesh's space, seen from the scene's.
-            slack = 4 * 2.0 ** -fmt.frac_width * np.abs(world - maps[slot, 3]).max()
-            boxes[slot] = world.min(axis=0) - slack, world.max(axis=0) + slack
-        return maps, boxes
-
-    def _tree_words(self, tree, node_base, list_base, entry_kind, place, matrix_base):
-        """Words of a tree's nodes and of its leaves' lists."""
-        inner = tree.axis != LEAF
-        empty = ~inner & (tree.count == 0)
-        child = np.where(inner, tree.child + node_base, tree.child + list_base).astype(np.int64)
-        lower = np.where(inner, tree.child, 0)
-        words = child & INDEX_MASK | tree.axis.astype(np.int64) << AXIS_SHIFT
-        words |= np.where(inner & empty[lower], LOWER_EMPTY, 0)
-        words |= np.where(inner & empty[np.minimum(lower + 1, len(empty) - 1)], UPPER_EMPTY, 0)
-        nodes = np.stack([words, self._fmt.encode(np.where(inner, tree.split, 0.0))], axis=1).astype(np.uint32)
-        if len(nodes) % 2:
-            nodes = np.concatenate([nodes, np.zeros((1, 2), np.uint32)])
-        entries = (tree.items if place is None else place[tree.items]).astype(np.int64) + matrix_base
-        entries |= entry_kind
-        ends = (tree.child + tree.count - 1)[~inner & ~empty]
-        entries[ends] |= LAST_ENTRY
-        return nodes, entries.astype(np.uint32)
 
 
 def compile_scene(scene, **options):

@@ -16,10 +16,13 @@ records   ⌈12·w  of full shading, instead: twelve lanes of w = max(bits of a 
           ÷ 32⌉  rtl/program/records.py
 texels    1      of full shading: see :mod:`sim.scene.texels`
 ========  =====  =================================================================================================
+
+Their order is that of :class:`~sim.scene.slots.MemoryLayout`. With two slots the n instances are those of both, so that
+whoever draws need not know of slots.
 """
 
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,7 +33,7 @@ from rtl.program.features import ShaderFeatures
 from .kdtree import LEAF
 from .triangles import unpack_fields
 
-__all__ = ["SceneImage", "describe"]
+__all__ = ["SceneImage", "describe", "tree_words"]
 
 AXIS_SHIFT, LOWER_EMPTY, UPPER_EMPTY = 24, 1 << 26, 1 << 27
 INDEX_MASK = (1 << 24) - 1
@@ -90,20 +93,35 @@ class SceneImage:
     texels: np.ndarray | None = None
     needs: ShaderFeatures | None = None
 
+    def updated(self, update):
+        """The image with what a :class:`~sim.scene.slots.SceneUpdate` brings; what does not change is shared."""
+        memories = {}
+        for piece in (*update.ahead, *update.between):
+            if piece.memory not in memories:
+                memories[piece.memory] = getattr(self, piece.memory).copy()
+            memories[piece.memory][piece.first:piece.first + len(piece.items)] = piece.items
+        return replace(self, **memories, root=update.root, center=update.center, scale=update.scale,
+                       stack_depth=update.stack_depth)
+
     def _memories(self):
-        full = () if self.records is None else (self.records, self.texels)
-        return self.nodes, self.lists, self.matrices, *(full or (self.shading,))
+        names = "nodes", "lists", "matrices", *(("shading",) if self.records is None else ("records", "texels"))
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def bytes_of_memories(self):
+        """Size of each memory."""
+        return {name: memory.nbytes for name, memory in self._memories().items()}
 
     @property
     def num_bytes(self):
         """Size of all memories together."""
-        return sum(memory.nbytes for memory in self._memories())
+        return sum(self.bytes_of_memories.values())
 
     @property
     def checksum(self):
         """CRC-32 of all memories."""
         crc = 0
-        for memory in self._memories():
+        for memory in self._memories().values():
             crc = zlib.crc32(memory.astype("<u4").tobytes(), crc)
         return crc
 
@@ -125,6 +143,41 @@ class SceneImage:
     def split_values(self):
         """float64[N]: the split position of each node."""
         return self.fmt.decode(self.nodes[:, 1])
+
+
+def tree_words(tree, *, fmt, first_node, first_entry, items, kinds):
+    """Words of a tree in memory.
+
+    Parameters
+    ----------
+    tree : KdTree
+    fmt : FloatFormat
+    first_node, first_entry : int
+        Where its nodes and its leaves' lists go.
+    items : int[K]
+        Matrix numbers of the leaves' primitives.
+    kinds : int or int[K]
+        Their bits of a list entry.
+
+    Returns
+    -------
+    nodes : uint32[N, 2]
+        An even number of them, as those that follow are in pairs too.
+    entries : uint32[K]
+    """
+    inner = tree.axis != LEAF
+    empty = ~inner & (tree.count == 0)
+    child = np.where(inner, tree.child + first_node, tree.child + first_entry).astype(np.int64)
+    lower = np.where(inner, tree.child, 0)
+    words = child & INDEX_MASK | tree.axis.astype(np.int64) << AXIS_SHIFT
+    words |= np.where(inner & empty[lower], LOWER_EMPTY, 0)
+    words |= np.where(inner & empty[np.minimum(lower + 1, len(empty) - 1)], UPPER_EMPTY, 0)
+    nodes = np.stack([words, fmt.encode(np.where(inner, tree.split, 0.0))], axis=1).astype(np.uint32)
+    if len(nodes) % 2:
+        nodes = np.concatenate([nodes, np.zeros((1, 2), np.uint32)])
+    entries = items.astype(np.int64) | kinds
+    entries[(tree.child + tree.count - 1)[~inner & ~empty]] |= LAST_ENTRY
+    return nodes, entries.astype(np.uint32)
 
 
 def describe(image, *, limit=20):

@@ -136,14 +136,15 @@ class Scene:
         if len(self.lights) > MAX_LIGHTS:
             raise SceneError(f"scene has {len(self.lights)} lights; the shader has room for {MAX_LIGHTS}; "
                              "leave some out")
-        for number, instance in enumerate(self.instances):
-            linear = instance.transform[:, :3]
-            if not np.isfinite(instance.transform).all():
-                raise SceneError(f"node '{instance.name}' (instance {number}): transform has a value that is not "
-                                 "finite")
-            if np.linalg.matrix_rank(linear) < 3 or np.linalg.cond(linear) > _MAX_CONDITION:
-                raise SceneError(f"node '{instance.name}' (instance {number}): transform is singular (flattens "
-                                 "the mesh); give it a non-zero scale on every axis")
+        transforms = np.array([instance.transform for instance in self.instances]).reshape(-1, 3, 4)
+        finite = np.isfinite(transforms).all(axis=(1, 2))
+        regular, linear = finite.copy(), transforms[finite, :, :3]
+        regular[finite] = (np.linalg.matrix_rank(linear) == 3) & ~(np.linalg.cond(linear) > _MAX_CONDITION)
+        if not regular.all():
+            number = int(np.argmin(regular))
+            what = ("is singular (flattens the mesh); give it a non-zero scale on every axis" if finite[number] else
+                    "has a value that is not finite")
+            raise SceneError(f"node '{self.instances[number].name}' (instance {number}): transform {what}")
         if not any(self.meshes[instance.mesh].usable.any() for instance in self.instances):
             raise SceneError("scene is empty: no instance has a usable triangle")
 
@@ -159,15 +160,13 @@ class Scene:
 
     def bounds(self):
         """``(lower, upper)`` float64[3], world space, of the corners of the instances' boxes."""
-        corners = []
-        for instance in self.instances:
-            box = np.array(self.meshes[instance.mesh].bounds())
-            if np.isfinite(box).all():
-                which = np.indices((2, 2, 2)).reshape(3, 8).T
-                points = np.take_along_axis(box, which, axis=0)
-                corners.append(points @ instance.transform[:, :3].T + instance.transform[:, 3])
-        corners = np.concatenate(corners)
-        return corners.min(axis=0), corners.max(axis=0)
+        boxes = np.array([mesh.bounds() for mesh in self.meshes])
+        shown = [instance for instance in self.instances if np.isfinite(boxes[instance.mesh]).all()]
+        transforms = np.array([instance.transform for instance in shown])
+        which = np.indices((2, 2, 2)).reshape(1, 3, 8).swapaxes(1, 2)
+        corners = np.take_along_axis(boxes[[instance.mesh for instance in shown]], which, axis=1)
+        corners = corners @ transforms[:, :, :3].swapaxes(1, 2) + transforms[:, None, :, 3]
+        return corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
 
     def default_camera(self):
         """First camera of the file, else a view of the whole scene from above one corner.
@@ -198,19 +197,51 @@ class Scene:
         """Time of the last key frame, in seconds; 0 for a still scene."""
         return self.animation.duration if self.is_animated else 0.0
 
-    def at_time(self, t):
+    def at_time(self, t, *, move=None):
         """The same scene with instances, cameras and lights where they are at time ``t``, in seconds.
 
         Times outside the key frames take the nearest one's value. Meshes are shared, not copied.
 
+        Parameters
+        ----------
+        t : float
+        move : callable, optional
+            ``move(number, instance, t)`` is asked where each :class:`Instance` is, which it gets as the key frames have
+            it: float64[3, 4], or None for there. So still scenes move too, if they are compiled with
+            ``flatten=False``::
+
+                def swing(number, instance, t):
+                    if instance.name == "door":
+                        c, s = np.cos(t), np.sin(t)
+                        return instance.transform @ [[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+
+                posed = scene.at_time(0.5, move=swing)
+
         Raises
         ------
         SceneError
-            If a transform is singular at that time.
+            If a transform is singular at that time, or what ``move`` returns is none.
         """
-        if not self.is_animated:
-            return self
-        transforms, cameras, lights = self.animation.pose(t)
-        instances = [replace(instance, transform=transform)
-                     for instance, transform in zip(self.instances, transforms, strict=True)]
-        return replace(self, instances=instances, cameras=cameras, lights=lights or self.lights)
+        posed = self
+        if self.is_animated:
+            transforms, cameras, lights = self.animation.pose(t)
+            instances = [replace(instance, transform=transform)
+                         for instance, transform in zip(self.instances, transforms, strict=True)]
+            posed = replace(self, instances=instances, cameras=cameras, lights=lights or self.lights)
+        if move is None:
+            return posed
+        return replace(posed, instances=[_moved(number, instance, move(number, instance, t))
+                                         for number, instance in enumerate(posed.instances)])
+
+
+def _moved(number, instance, transform):
+    if transform is None:
+        return instance
+    try:
+        transform = np.array(transform, np.float64)
+        if transform.shape != (3, 4):
+            raise ValueError(f"of shape {transform.shape}")
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"node '{instance.name}' (instance {number}): what moves it must return a 3×4 matrix [A | b] "
+                         f"or None: {error}") from error
+    return replace(instance, transform=transform)

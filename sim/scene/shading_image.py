@@ -12,7 +12,7 @@ from .normals import flat_normals
 from .srgb import encode
 from .texels import pack_textures
 
-__all__ = ["needed_features", "shading_records"]
+__all__ = ["frame_records", "needed_features", "num_lights", "shading_records"]
 
 # Ambient light of scenes that have no lights of their own.
 _HEADLIGHTS_AMBIENT = 0.15
@@ -102,17 +102,10 @@ class _Records:
         self.fields[rows, first:first + values.shape[-1]] = values
 
 
-def _globals(records, scene, background, sky, first_light, num_lights):
-    ambient = scene.ambient
-    if not scene.lights and not any(ambient):
-        ambient = (_HEADLIGHTS_AMBIENT,) * 3
-    most = max(ambient)
-    ambient = np.rint(255 * np.array(ambient) / most) / 255 * most if most else np.zeros(3)
+def _beyond(records, background, sky):
     table = linear_colors()
-    records.integers(0, 0, np.minimum(np.rint(ambient * COLOR_ONE), (1 << 24) - 1).astype(np.int64))
     records.integers(BEYOND, 0, [table[level] for level in background])
     records.integers(BEYOND, 3, sky)
-    records.integers(0, 9, [first_light, first_light + num_lights])
 
 
 def _with_flags(fmt, value, flags, bits):
@@ -195,8 +188,8 @@ def _triangles(records, scene, rows, mesh, prim, linear, smooth_row, material_ro
         records.floats(smooth, 3 * k, column)
 
 
-def shading_records(scene, image, *, parts, eye, background):
-    """The shading memory's records and the texture memory of a scene.
+def shading_records(scene, image, *, parts, background, num_slots):
+    """The shading memory's records and the texture memory of a scene, but for what :func:`frame_records` has.
 
     Parameters
     ----------
@@ -206,48 +199,90 @@ def shading_records(scene, image, *, parts, eye, background):
     parts : list of (Mesh, matrices, prims, linear)
         Triangles: the numbers of their matrices, their numbers in the mesh, and the map to the chip's space without
         its translation if they are in it, else None.
-    eye : float64[3]
-        Where the headlight of a scene without lights is.
     background : tuple of int
         sRGB-encoded bytes.
+    num_slots : int
+        Frames whose lights have room.
 
     Returns
     -------
     records : int64[R, 12]
         The fields.
     texels : uint32[K]
+    first_light : int
+        The first slot's first light.
     """
     fmt, num_matrices = image.fmt, len(image.matrices)
-    lights = scene.lights or [Light.headlight(eye)]
     descriptors, sky, texels = pack_textures([material.texture for material in scene.materials], scene.sky)
     smooth = [mesh.normals is not None for mesh, *_ in parts]
     num_smooth = sum(len(prim) for (_, _, prim, _), has in zip(parts, smooth, strict=True) if has)
     first_material = FIRST_MATRIX + num_matrices
     first_light = first_material + 2 * len(scene.materials)
-    first_smooth = first_light + len(lights)
+    first_smooth = first_light + num_slots * num_lights(scene)
     count = first_smooth + num_smooth
     if count > 1 << 24:
         raise SceneError(f"scene needs {count:,} records of shading, more than the {1 << 24:,} that the shader "
                          "addresses; leave objects out")
     records = _Records(fmt, count)
-    _globals(records, scene, background, sky, first_light, len(lights))
+    _beyond(records, background, sky)
     material_rows = first_material + np.arange(2 * len(scene.materials)).reshape(-1, 2)
     for number, material in enumerate(scene.materials):
         # As it is on meshes without and with texture coordinates.
         _material(records, material_rows[number, 0], material, None)
         _material(records, material_rows[number, 1], material, descriptors[number])
-    for number, light in enumerate(lights):
-        _light(records, first_light + number, light, image.center, image.scale)
-    instances = image.matrix_values()[:image.num_instances, :3].reshape(-1, 9)
-    if len(instances):
-        # Normals are made unit vectors afterwards; so any scale will do.
-        records.floats(np.arange(FIRST_MATRIX, FIRST_MATRIX + len(instances)), 0,
-                       instances * 2.0 ** -np.floor(np.log2(np.abs(instances).max(axis=1, keepdims=True))))
     row = first_smooth
     for (mesh, matrices, prim, linear), has_normals in zip(parts, smooth, strict=True):
         _triangles(records, scene, FIRST_MATRIX + matrices, mesh, prim, linear, row if has_normals else None,
                    material_rows)
         row += len(prim) if has_normals else 0
-    if not np.isfinite(fmt.quantize(instances)).all():
-        raise SceneError(f"an instance's transform does not fit format {fmt}")
-    return records.fields, texels
+    return records.fields, texels, first_light
+
+
+def num_lights(scene):
+    """Lights of a scene in memory: without its own it has one at the eye."""
+    return len(scene.lights) or 1
+
+
+def frame_records(scene, *, fmt, center, scale, maps, first_light, eye):
+    """The records that change from frame to frame.
+
+    Parameters
+    ----------
+    scene : Scene
+        As it stands in the frame.
+    fmt : FloatFormat
+    center : float64[3]
+    scale : float
+        The chip's scene coordinates are (world − center) · scale.
+    maps : float64[I, 4, 3]
+        The instances' matrices.
+    first_light : int
+        Number of the frame's first light.
+    eye : float64[3]
+        Where the headlight of a scene without lights is.
+
+    Returns
+    -------
+    instances : int64[I, 12]
+    lights : int64[L, 12]
+    about_lights : int64[1, 12]
+        Record 0.
+    """
+    lights = _Records(fmt, num_lights(scene))
+    for number, light in enumerate(scene.lights or [Light.headlight(eye)]):
+        _light(lights, number, light, center, scale)
+    linear = maps[:, :3].reshape(-1, 9)
+    instances = _Records(fmt, len(linear))
+    if len(linear):
+        # Normals are made unit vectors afterwards; so any scale will do.
+        instances.floats(np.arange(len(linear)), 0,
+                         linear * 2.0 ** -np.floor(np.log2(np.abs(linear).max(axis=1, keepdims=True))))
+    ambient = scene.ambient
+    if not scene.lights and not any(ambient):
+        ambient = (_HEADLIGHTS_AMBIENT,) * 3
+    most = max(ambient)
+    ambient = np.rint(255 * np.array(ambient) / most) / 255 * most if most else np.zeros(3)
+    about = _Records(fmt, 1)
+    about.integers(0, 0, np.minimum(np.rint(ambient * COLOR_ONE), (1 << 24) - 1).astype(np.int64))
+    about.integers(0, 9, [first_light, first_light + num_lights(scene)])
+    return instances.fields, lights.fields, about.fields

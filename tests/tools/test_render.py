@@ -15,7 +15,9 @@ from PIL import Image
 
 from sim.golden import render_golden
 from sim.scene import load_scene
+from tools.animation import frame_durations
 from tools.cli import main
+from tools.errors import BadInput
 
 
 def run(*arguments):
@@ -114,12 +116,100 @@ def test_a_panorama_as_the_sky(tmp_path):
     assert (np.asarray(Image.open(tmp_path / "x.png")) == (10, 90, 200)).all()
 
 
+def frames_of(path):
+    """Pictures of an animation uint8[N, H, W, 3], and the milliseconds that each is shown."""
+    with Image.open(path) as file:
+        colors, durations = [], []
+        for number in range(file.n_frames):
+            file.seek(number)
+            colors.append(np.asarray(file.convert("RGB")))
+            durations.append(file.info["duration"])
+        assert file.info["loop"] == 0
+    return np.array(colors), durations
+
+
 def test_frames_of_the_walk(tmp_path):
     result = run("render", "walk", "-o", tmp_path / "w.png", "--engine", "golden", "--shading", "full", "--depth", "1",
-                 "--size", "32x24", "--frames", "2")
+                 "--size", "32x24", "--frames", "3", "--report", tmp_path / "w.json")
     assert result.exit_code == 0, result.output
-    first, second = (np.asarray(Image.open(tmp_path / f"w-000{k}.png")) for k in (0, 1))
-    assert (first != second).mean() > 0.5
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["w-0000.png", "w-0001.png", "w-0002.png", "w.json",
+                                                                "w.png"]
+    pictures = [np.asarray(Image.open(tmp_path / f"w-000{k}.png")) for k in range(3)]
+    assert (pictures[0] != pictures[1]).mean() > 0.5
+    colors, durations = frames_of(tmp_path / "w.png")
+    assert (colors == pictures).all()
+    assert durations == [2667, 2666, 2667]
+    assert [report["time"] for report in json.loads((tmp_path / "w.json").read_text())] == [0, 8 / 3, 16 / 3]
+
+
+def test_frames_as_a_gif(tmp_path):
+    result = run("render", "walk", "-o", tmp_path / "w.gif", "--engine", "model", "--size", "64x48", "--frames", "3",
+                 "--no-check")
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["w-0000.png", "w-0001.png", "w-0002.png", "w.gif"]
+    with Image.open(tmp_path / "w.gif") as file:
+        assert file.format == "GIF"
+    colors, durations = frames_of(tmp_path / "w.gif")
+    assert durations == [2670, 2660, 2670]
+    for number, color in enumerate(colors):
+        picture = np.asarray(Image.open(tmp_path / f"w-000{number}.png")).astype(int)
+        # 256 colours a picture.
+        assert np.abs(picture - color).mean() < 6
+
+
+@pytest.mark.xdist_group("chip")
+def test_frames_by_one_chip(tmp_path):
+    result = run("render", "walk", "-o", tmp_path / "w.png", "--size", "32x24", "--frames", "3", "--report",
+                 tmp_path / "w.json")
+    assert result.exit_code == 0, result.output
+    first, *others = json.loads((tmp_path / "w.json").read_text())
+    assert first["upload"]["bytes"] == first["memory"]["bytes"]
+    assert len(others) == 2
+    for before, report in zip([first, *others], others, strict=False):
+        assert report["wrong_pixels_vs_model"] == 0
+        assert report["psnr_vs_golden"] > 40
+        assert report["upload"]["bytes_per_cycle"] * before["cycles"] == pytest.approx(report["upload"]["bytes"])
+        assert f"{report['upload']['bytes']:,} bytes uploaded, " in result.output
+    # One after the other by the same chip as alone, and by the model.
+    result = run("render", "walk", "-o", tmp_path / "m.png", "--engine", "model", "--size", "32x24", "--frames", "3",
+                 "--no-check")
+    assert result.exit_code == 0, result.output
+    assert (frames_of(tmp_path / "w.png")[0] == frames_of(tmp_path / "m.png")[0]).all()
+
+
+def test_an_animation_that_fails_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(path, colors, durations):
+        path.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tools.render.save_animation", interrupted)
+    result = run("render", "walk", "-o", tmp_path / "w.png", "--engine", "golden", "--size", "8x6", "--frames", "2",
+                 "--report", tmp_path / "w.json")
+    assert result.exit_code not in (0, None)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("name", "arguments", "says"), [
+    ("x.gif", [], r"-o: x\.gif would be an animation; give --frames, or a name that ends in \.png"),
+    ("x.jpg", [], r"-o: x\.jpg must end in \.png(?!, or)"),
+    ("x", ["--frames", "2"], r"-o: x must end in \.png, or \.gif"),
+    ("x.gif", ["--frames", "500"], r"--frames: 500 pictures in 8 s are more than the 50 a second that viewers of GIFs "
+     r"show; ask for fewer, or for a \.png"),
+    ("x.png", ["--frames", "1", "--wave", "x.vcd", "--engine", "rtl"], r"--wave shows one picture; leave --frames out"),
+    ("x.png", ["--frames", "2", "--flatten"], r"instance 'weapon' moves, but the scene is flat: all triangles lie in "
+     r"one space; compile it with flatten=False \(dynrt: --instances\)"),
+])
+def test_bad_animations(tmp_path, name, arguments, says):
+    fails(tmp_path, "walk", "--engine", "model", "--size", "8x8", *arguments, says=says,
+          output=tmp_path / "out" / name)
+
+
+def test_durations():
+    assert frame_durations(3, 1.0, is_gif=False) == [333, 334, 333]
+    assert frame_durations(3, 1.0, is_gif=True) == [330, 340, 330]
+    assert sum(frame_durations(399, 8.0, is_gif=True)) == 8000
+    with pytest.raises(BadInput, match="401 pictures in 8 s"):
+        frame_durations(401, 8.0, is_gif=True)
 
 
 def obj(tmp_path, text, name="scene.obj"):

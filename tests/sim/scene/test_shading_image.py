@@ -14,7 +14,8 @@ from sim.scene import Light, Material, Mesh, Scene, SceneError, Sky, Texture
 from sim.scene.compile import CompiledScene
 from sim.scene.image import SOLID_ENTRY
 from sim.scene.scene import IDENTITY, Instance
-from sim.scene.texels import FILTERED, FOLDED, blocks, pack_textures
+from sim.scene.texels import FILTERED, FOLDED, pack_textures
+from sim.scene.texture_memory import pack_texture
 from sim.scene.triangles import pack_fields, unpack_fields
 
 from ..golden.rooms import ball, leaf, quad, scene_of
@@ -42,7 +43,7 @@ def test_fields_go_in_and_out():
 
 def test_texels_lie_in_blocks():
     pixels = np.arange(4 * 8 * 4, dtype=np.uint8).reshape(4, 8, 4)
-    words = blocks(pixels)
+    words = pack_texture(pixels)
     for i in range(8):
         for j in range(4):
             word = words[4 * ((j >> 1) * 4 + (i >> 1)) + 2 * (j & 1) + (i & 1)]
@@ -52,7 +53,7 @@ def test_texels_lie_in_blocks():
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 4), (4, 1), (2, 2)])
 def test_sides_of_one_are_doubled(width, height):
     pixels = np.random.default_rng(0).integers(0, 256, (height, width, 4), np.uint8)
-    words = blocks(pixels)
+    words = pack_texture(pixels)
     assert len(words) == max(width, 2) * max(height, 2)
     for i in range(max(width, 2)):
         for j in range(max(height, 2)):
