@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants clean
+.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -14,6 +14,7 @@ help:
 	@echo "make fpu-report   the figures of docs/fpu.md: every operator placed and routed; PEER=FILE puts others' beside ours"
 	@echo "make arithmetic   what fused sums, tables and truncation do to pictures and datapaths, for docs/fpu.md"
 	@echo "make fpu-pairs    ten million pairs through every operator, against exact integers: docs/results/fpu_pairs.json"
+	@echo "make pipeline     the figures of docs/pipeline.md: full shading on the simulated chip"
 	@echo "make mutants      faults planted in the operators, each found by a test: docs/results/mutants.json"
 
 setup: $(VENV)/.ready
@@ -48,6 +49,9 @@ fpu-pairs: setup
 
 mutants: setup
 	$(BIN)/python -m tests.mutation --output docs/results/mutants.json
+
+pipeline: setup
+	$(BIN)/dynrt pipeline
 
 clean:
 	rm -rf build .pytest_cache .ruff_cache

@@ -6,6 +6,7 @@ from .arithmetic import arithmetic
 from .first_light import first_light
 from .fpu_report import fpu_report
 from .inspect import image
+from .pipeline import pipeline
 from .render import render
 
 __all__ = ["main"]
@@ -20,5 +21,6 @@ def main():
 main.add_command(arithmetic)
 main.add_command(first_light)
 main.add_command(fpu_report)
+main.add_command(pipeline)
 main.add_command(render)
 main.add_command(image)
