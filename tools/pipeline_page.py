@@ -8,8 +8,8 @@ __all__ = ["filled"]
 def _demos(results):
     rows = results.get("demos", [])
     drawn = markdown_table(
-        ["demo", "size", "cycles", "rays", "cycles a ray", "instructions a pixel", "chip ≠ model", "PSNR, model and golden",
-         "FLIP", "another first surface", "pixels > 8 levels off", "PSNR of the others"],
+        ["demo", "size", "cycles", "rays", "cycles a ray", "instructions a pixel", "chip ≠ model",
+         "PSNR, model and golden", "FLIP", "another first surface", "pixels > 8 levels off", "PSNR of the others"],
         [[row["demo"], "×".join(map(str, row["size"])), f"{row['cycles']:,}", f"{row['rays']:,}", row["cycles_per_ray"],
           row["instructions_per_pixel"], row["rtl_wrong_pixels"], f"{row['psnr_db']} dB", row["flip"],
           row["other_surface_pixels"], row["far_pixels"], f"{row['psnr_near_db']} dB"] for row in rows])
