@@ -124,8 +124,8 @@ class Bench:
         Raises
         ------
         HangError
-            If no unit took anything in for ``hang_cycles`` cycles. Default: 20,000, and 200,000 of a chip with a shader,
-            in which all rays may be at work for long before any of them is traced.
+            If no unit took anything in for ``hang_cycles`` cycles. Default: 20,000, and 200,000 of a chip with a
+            shader, in which all rays may be at work for long before any of them is traced.
         SimulationError
             If an assertion of the chip fails, it reads beyond a memory or writes beyond the picture, or the
             picture takes more than ``max_cycles``.
