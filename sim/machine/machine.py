@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from rtl.dynrtp import cache_names, memory_ports
+from rtl.memory_ports import cache_names, memory_ports
 from rtl.ray_generation import packet_order
 from rtl.write_out import pixel_layout
 

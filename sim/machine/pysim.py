@@ -8,7 +8,7 @@ from amaranth.hdl import Signal
 from amaranth.sim import Simulator
 
 from rtl.dynrtc import DynRTC, counter_names
-from rtl.dynrtp import memory_ports
+from rtl.memory_ports import memory_ports
 
 from .bench import HangError
 from .machine import camera_words, decode_pixels, memory_words, report_of

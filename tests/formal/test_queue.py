@@ -1,7 +1,7 @@
 """Queue and Merge lose nothing, double nothing, keep the order."""
 
 import pytest
-from amaranth.hdl import Assert, Cat, Const, Module, Signal
+from amaranth.hdl import Assert, Assume, Cat, Const, Module, Signal
 
 from rtl.queue import Merge, Queue
 from tests.formal.prove import Refuted, prove
@@ -76,6 +76,21 @@ def test_merge_passes_each_element_once(tmp_path, num_inputs):
         *(Assert(~take | (dut.o.payload == port.payload)) for port, take in zip(dut.i, taken, strict=True)),
     ]
     prove(m, ports=ports, cycles=2, by_induction=True, folder=tmp_path)
+
+
+@pytest.mark.parametrize("num_inputs", [2, 3])
+def test_merge_offers_an_element_until_it_is_taken(tmp_path, num_inputs):
+    m, dut, ports, _ = merge_proof(num_inputs)
+
+    def holds(port, name):
+        """Whether what the stream has offered before, and nobody took, is there still."""
+        waits, last = Signal(name=f"{name}_waits"), Signal(WIDTH, name=f"{name}_last")
+        m.d.sync += [waits.eq(port.valid & ~port.ready), last.eq(port.payload)]
+        return ~waits | port.valid & (port.payload == last)
+
+    m.d.comb += [*(Assume(holds(port, f"input{number}")) for number, port in enumerate(dut.i)),
+                 Assert(holds(dut.o, "output"))]
+    prove(m, ports=ports, cycles=12, by_induction=False, folder=tmp_path)
 
 
 @pytest.mark.parametrize("num_inputs", [2, 3])

@@ -3,7 +3,6 @@
 import math
 import random
 import re
-from fractions import Fraction
 
 import pytest
 from amaranth.back import rtlil
@@ -13,52 +12,12 @@ from fpu import FloatFormat
 from rtl.color_unit import ColorUnit, byte_fraction
 from rtl.microcode import Op, lane_width
 from tests.bench import simulate
-from tests.fpu import reference
 from tests.rtl import colors
+from tests.rtl.color_operations import HIGHEST, color_operation
 
 WIDE, NARROW, WIDEST = FloatFormat(7, 16), FloatFormat(5, 8), FloatFormat(8, 23)
 OPERATIONS = [Op.ROOT, Op.CUT, Op.COLOR_MULTIPLY, Op.COLOR_ADD, Op.COLOR_SUBTRACT, Op.DECODE, Op.BYTES, Op.OFFSET,
               Op.MOVE]
-HIGHEST = 2**24 - 1
-
-
-def offset(fmt, floats, offset_log2):
-    """Bits of 2^offset_log2 units in the last place of the largest of ``floats``."""
-    widths = fmt.exp_width, fmt.frac_width
-    exp = max(bits >> fmt.frac_width & fmt.exp_inf for bits in floats)
-    if exp == fmt.exp_inf:
-        return max(0, exp - fmt.frac_width + offset_log2) << fmt.frac_width
-    largest = max(reference.unpack(bits, *widths)[1] for bits in floats)
-    if largest == 0:
-        return 0
-    # Denominators are powers of two.
-    power = Fraction(2 ** (largest.numerator.bit_length() - 1), largest.denominator)
-    return reference.pack(0, power * 2**offset_log2 / 2**fmt.frac_width, *widths)
-
-
-def expected(fmt, op, a, x, *, offset_log2=3):
-    widths, mask = (fmt.exp_width, fmt.frac_width), (1 << fmt.width) - 1
-    bytes_of_x = [x[0] >> place & 255 for place in (16, 8, 0)]
-    colors_of = [(lane & HIGHEST, other & HIGHEST) for lane, other in zip(a, x, strict=True)]
-    match op:
-        case Op.ROOT:
-            return [reference.reciprocal_square_root(x[0] & mask, *widths)] * 3
-        case Op.CUT:
-            return [reference.to_int(lane & mask, 0, HIGHEST, *widths, 16) for lane in x]
-        case Op.COLOR_MULTIPLY:
-            return [min((lane * (other & 0x1ffff) + 32768) // 65536, HIGHEST) for lane, other in colors_of]
-        case Op.COLOR_ADD:
-            return [min(lane + other, HIGHEST) for lane, other in colors_of]
-        case Op.COLOR_SUBTRACT:
-            return [max(lane - other, 0) for lane, other in colors_of]
-        case Op.DECODE:
-            return [colors.linear_color(byte) for byte in bytes_of_x]
-        case Op.BYTES:
-            return [colors.byte_fraction(byte) for byte in bytes_of_x]
-        case Op.OFFSET:
-            return [offset(fmt, [lane & mask for lane in (*a, *x)], offset_log2)] * 3
-        case Op.MOVE:
-            return list(x)
 
 
 def run(dut, fmt, operations):
@@ -87,7 +46,7 @@ def run(dut, fmt, operations):
 
 def check(dut, fmt, operations, **parameters):
     for given, got in zip(operations, run(dut, fmt, operations), strict=True):
-        assert got == expected(fmt, *given, **parameters), given
+        assert got == color_operation(fmt, *given, **parameters), given
 
 
 def random_lane(fmt, op, rng):

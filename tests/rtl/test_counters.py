@@ -24,3 +24,25 @@ def test_counts_clears_and_wraps():
             assert {name: ctx.get(getattr(dut, name)) for name in names} == expected
 
     simulate(dut, count, name="counters")
+
+
+def test_events_of_several_sources():
+    names = ("cycles", "often", "rarely")
+    num_sources = 3
+    dut = Counters(names, width=8, num_sources=num_sources)
+    rng = random.Random(2)
+    seen = {name: set() for name in names}
+
+    async def count(ctx):
+        expected = dict.fromkeys(names, 0)
+        for _ in range(300):
+            events = {"cycles": 1, "often": rng.randrange(num_sources + 1), "rarely": num_sources * (rng.random() < .1)}
+            for name, event in events.items():
+                ctx.set(getattr(dut, f"event_{name}"), event)
+                seen[name].add(event)
+            await ctx.tick()
+            expected = {name: (count + events[name]) % 256 for name, count in expected.items()}
+            assert {name: ctx.get(getattr(dut, name)) for name in names} == expected
+
+    simulate(dut, count, name="counters")
+    assert seen == {"cycles": {1}, "often": {0, 1, 2, 3}, "rarely": {0, 3}}

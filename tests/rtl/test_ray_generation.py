@@ -111,3 +111,73 @@ def test_pictures(seed, num_threads, sizes, gap):
         feed(dut.finished, finished, rng=rng, gap=gap),
         drain(dut.finished, lambda token: at_work.pop(token.thread)), not_ready_too_early))
     assert not started
+
+
+@pytest.mark.parametrize(("seed", "num_pipelines", "sizes", "gap"), [
+    (0, 2, [(33, 18)], 0.0), (1, 3, [(1, 1), (17, 9), (40, 3)], 0.6), (2, 4, [(2, 2), (37, 50)], 0.9)])
+def test_each_packet_goes_to_one_pipeline(seed, num_pipelines, sizes, gap):
+    rng = random.Random(seed)
+    dut = RayGeneration(coord_width=COORD_WIDTH, num_pipelines=num_pipelines)
+    taken = [[] for _ in range(num_pipelines)]
+    pictures = []
+
+    def take(pipeline):
+        return lambda packet: taken[pipeline].append((packet.x, packet.y, packet.mask))
+
+    async def draw(ctx):
+        for width, height in sizes:
+            assert ctx.get(dut.ready)
+            ctx.set(dut.width, width)
+            ctx.set(dut.height, height)
+            ctx.set(dut.start, 1)
+            await ctx.tick()
+            ctx.set(dut.start, 0)
+            expected = [(x, y, sum(1 << ray for ray in range(4) if x + ray % 2 < width and y + ray // 2 < height))
+                        for x, y in reference_order(width, height)]
+            ready = False
+            while not ready:
+                _, _, ready = await ctx.tick().sample(dut.ready)
+                # When it is ready, what is left has just been taken.
+                assert not ready or sum(map(len, taken)) == len(expected)
+            place = {packet: number for number, packet in enumerate(expected)}
+            assert sorted(place[packet] for packets in taken for packet in packets) == list(range(len(expected)))
+            for packets in taken:
+                assert packets == sorted(packets, key=place.get), "a pipeline's packets are out of order"
+            pictures.append([len(packets) for packets in taken])
+            for packets in taken:
+                packets.clear()
+
+    simulate(dut, draw, name="ray_generation", background=tuple(
+        drain(port, take(number), rng=rng, gap=gap) for number, port in enumerate(dut.packet)))
+    assert len(pictures) == len(sizes)
+    most = pictures[-1]
+    assert min(most) > sum(most) / num_pipelines * 0.6
+
+
+@pytest.mark.parametrize("num_pipelines", [2, 4])
+def test_one_that_stands_still_holds_up_no_other(num_pipelines):
+    dut = RayGeneration(coord_width=COORD_WIDTH, num_pipelines=num_pipelines)
+    order = list(packet_order(32, 32))
+    taken = []
+
+    async def draw(ctx):
+        ctx.set(dut.width, 32)
+        ctx.set(dut.height, 32)
+        ctx.set(dut.start, 1)
+        await ctx.tick()
+        ctx.set(dut.start, 0)
+        while len(taken) < len(order) - 2:
+            await ctx.tick()
+        await ctx.tick().repeat(50)
+        assert not ctx.get(dut.ready)
+        ctx.set(dut.packet[1].ready, 1)
+        for _ in range(2):
+            _, _, valid, packet = await ctx.tick().sample(dut.packet[1].valid, dut.packet[1].payload)
+            assert valid
+            taken.append((packet.x, packet.y))
+        assert ctx.get(dut.ready)
+
+    simulate(dut, draw, name="ray_generation", background=tuple(
+        drain(port, lambda packet: taken.append((packet.x, packet.y))) for number, port in enumerate(dut.packet)
+        if number != 1))
+    assert sorted(taken) == sorted(order)

@@ -123,3 +123,45 @@ def test_vectors_that_come_too_early_are_noticed(cycles, is_noticed):
             simulate(dut, write, name="ray_store")
     else:
         simulate(dut, write, name="ray_store")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rays_with_origins_of_their_own(seed):
+    rng = random.Random(seed)
+    num_threads = 3
+    dut = RayStore(fmt=FMT, num_threads=num_threads)
+    arithmetic = Rounded(FMT)
+    # By thread, level and ray as steps see it; by ray, as it was written, as transformation does.
+    seen, stored = {}, {}
+    num_checked = {"own": 0, "shared": 0}
+
+    async def work(ctx):
+        for _ in range(60):
+            thread, level, own = rng.randrange(num_threads), rng.randrange(2), rng.random() < 0.7
+            for ray in rng.sample(range(PACKET_RAYS), rng.randrange(1, PACKET_RAYS + 1)) if own else [0]:
+                vector = [arithmetic.any(rng) for _ in range(3)]
+                ctx.set(dut.write, {"valid": 1, "own": own, "thread": thread, "level": level, "is_origin": 1,
+                                    "ray": ray, "vector": dict(zip("xyz", vector, strict=True))})
+                stored[thread, level, ray] = vector
+                for other in [ray] if own else range(PACKET_RAYS):
+                    seen[thread, level, other] = vector
+                # Origins of different rays go to different banks, and may follow each other at once.
+                await ctx.tick()
+            ctx.set(dut.write.valid, 0)
+            await ctx.tick().repeat(RayStore.write_latency)
+            axis = rng.randrange(3)
+            ctx.set(dut.step_address, {"thread": thread, "level": level, "axis": Axis(axis)})
+            ray = rng.randrange(PACKET_RAYS) if own else 0
+            ctx.set(dut.vector_address, {"thread": thread, "level": level, "is_origin": 1, "ray": ray})
+            await ctx.tick().repeat(RayStore.read_latency)
+            for number in range(PACKET_RAYS):
+                if vector := seen.get((thread, level, number)):
+                    assert ctx.get(dut.step_rays[number].origin) == vector[axis]
+                    num_checked["own" if own else "shared"] += 1
+            if vector := stored.get((thread, level, ray)):
+                got = ctx.get(dut.vector)
+                assert [got.x, got.y, got.z] == vector
+
+    simulate(dut, work, name="ray_store")
+    assert num_checked["own"] > 80
+    assert num_checked["shared"] > 30

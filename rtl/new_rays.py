@@ -1,0 +1,98 @@
+"""Where the rays of a packet begin in the shader."""
+
+from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from fpu import Delay, IntToFloat
+
+from .layout import PACKET_RAYS, thread_width, token_layout, with_token
+from .queue import Queue
+
+__all__ = ["NewRays"]
+
+_CONVERT_LATENCY = 3
+_QUEUE_DEPTH = 16
+
+
+class NewRays(wiring.Component):
+    """Makes a packet's rays, one a cycle: (x, y, 1) of the screen, x and y as floats, goes to register 0 of each.
+
+    Parameters
+    ----------
+    fmt : :class:`~fpu.FloatFormat`
+        Format of floats.
+    num_threads, stack_depth, coord_width : int
+        See :class:`~rtl.config.ChipConfig`.
+    result : StructLayout
+        See :func:`~rtl.results.result_layout`.
+
+    Members
+    -------
+    primary : stream of ``{"token", "x", "y"}``: a packet to draw, see :class:`~rtl.transformation.Transformation`
+    begin : stream of ``{"thread", "mask"}``: a packet that is begun with so many rays, before they are made
+    ray : stream of results: a ray with its register
+    """
+
+    def __init__(self, *, fmt, num_threads, stack_depth, coord_width, result):
+        self._fmt = fmt
+        self._half_width = coord_width + 2
+        self._result = result
+        self._place = data.StructLayout({"thread": thread_width(num_threads), "ray": range(PACKET_RAYS)})
+        token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
+        half = signed(self._half_width)
+        super().__init__({
+            "primary": In(stream.Signature(with_token(token, x=half, y=half))),
+            "begin": Out(stream.Signature(data.StructLayout({"thread": thread_width(num_threads),
+                                                             "mask": PACKET_RAYS}))),
+            "ray": Out(stream.Signature(result)),
+        })
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.queue = queue = Queue(self._result, depth=_QUEUE_DEPTH, always_ready=True)
+        packet = self.primary.payload
+        done = Signal(PACKET_RAYS)
+        remaining, others = Signal(PACKET_RAYS), Signal(PACKET_RAYS)
+        ray = Signal(range(PACKET_RAYS))
+        pending = Signal(range(_QUEUE_DEPTH + 1))
+        has_room, issue, is_first = Signal(), Signal(), Signal()
+        for number in reversed(range(PACKET_RAYS)):
+            with m.If(remaining[number]):
+                m.d.comb += ray.eq(number)
+        m.d.comb += [
+            remaining.eq(packet.token.mask & ~done),
+            others.eq(remaining & (remaining - 1)),
+            is_first.eq(~done.any()),
+            has_room.eq(pending < _QUEUE_DEPTH),
+            self.begin.valid.eq(self.primary.valid & is_first & has_room),
+            self.begin.payload.thread.eq(packet.token.thread),
+            self.begin.payload.mask.eq(packet.token.mask),
+            issue.eq(self.primary.valid & has_room & (~is_first | self.begin.ready)),
+            self.primary.ready.eq(issue & ~others.any()),
+        ]
+        m.d.sync += pending.eq(pending + issue - (self.ray.valid & self.ray.ready))
+        with m.If(issue):
+            m.d.sync += done.eq(Mux(others.any(), done | (1 << ray), 0))
+
+        m.submodules.beside = beside = Delay(self._place, cycles=_CONVERT_LATENCY)
+        valid = Signal(_CONVERT_LATENCY + 1)
+        made = queue.i.payload
+        m.d.comb += [
+            valid[0].eq(issue),
+            beside.i.thread.eq(packet.token.thread),
+            beside.i.ray.eq(ray),
+            queue.i.valid.eq(valid[-1]),
+            made.token.thread.eq(beside.o.thread),
+            made.token.ray.eq(beside.o.ray),
+            made.last.eq(1),
+            made.mask.eq(0b111),
+            made.value[2].eq(self._fmt.const(1.0)),
+        ]
+        m.d.sync += valid[1:].eq(valid[:-1])
+        for lane, value in enumerate((packet.x + 2 * ray[0], packet.y - 2 * ray[1])):
+            convert = IntToFloat(self._fmt, int_width=self._half_width, signed=True, latency=_CONVERT_LATENCY)
+            m.submodules[f"screen{lane}"] = convert
+            m.d.comb += [convert.i.eq(value), made.value[lane].eq(convert.r)]
+        wiring.connect(m, queue.o, wiring.flipped(self.ray))
+        return m

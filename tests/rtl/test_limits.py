@@ -1,0 +1,180 @@
+"""Intersection of rays with limits: nearest and farthest distance, a triangle they do not hit, any hit that will do."""
+
+import math
+import random
+from collections import Counter, deque
+
+import pytest
+
+from fpu import FloatFormat
+from rtl.intersection import Intersection
+from rtl.layout import PACKET_RAYS
+from tests.bench import drain, feed, simulate
+from tests.rtl.packets import fields, random_token, rays_of
+from tests.rtl.rounded import Rounded, same
+from tests.rtl.test_intersection import reference_test
+
+FMT = FloatFormat(5, 8)
+LATENCIES = {"add": 4, "mul": 2, "div": 6, "cmp": 1}
+STACK_DEPTH, INDEX_WIDTH = 3, 8
+#: Triangle that a ray has hit that has hit none; instance of a triangle that is in none.
+NONE = (1 << INDEX_WIDTH) - 1
+NUM_TRIANGLES = 3
+
+
+class World:
+    """Rays with limits, the packets in triangles' spaces that they are tested in, and what they are to have hit."""
+
+    def __init__(self, *, seed, num_threads, num_packets, near):
+        self.near = near
+        self.rng = random.Random(seed)
+        self.arithmetic = Rounded(FMT)
+        self.num_packets = num_packets
+        self.limits, self.vectors, self.entered = deque(), deque(), deque()
+        # Of each thread: limits by ray, records by ray, tests that are still to come, and its instance.
+        self.rays, self.records = {}, {thread: {} for thread in range(num_threads)}
+        self.left = dict.fromkeys(range(num_threads), 0)
+        self.instances, self.expected = {}, {}
+        self.events = Counter()
+
+    def begin(self, thread):
+        """The limits of a packet's rays."""
+        rng = self.rng
+        self.num_packets -= 1
+        self.left[thread] = rng.randrange(3, 7)
+        self.rays[thread], self.records[thread] = {}, {}
+        for ray in rng.sample(range(PACKET_RAYS), rng.randrange(1, PACKET_RAYS + 1)):
+            limits = {"t_near": rng.choice([0.0, 0.0, 0.5, 1.0, 1.5]),
+                      "triangle": rng.choice([*range(NUM_TRIANGLES), NONE]),
+                      "instance": rng.choice([*range(2), NONE, NONE]), "any_hit": rng.randrange(2)}
+            has_far, t_far = rng.randrange(2), rng.choice([0.75, 1.0, 2.0, 3.5])
+            self.limits.append({"thread": thread, "ray": ray, "has_far": has_far, "t_far": t_far, "limits": limits})
+            self.rays[thread][ray] = limits
+            if has_far:
+                self.records[thread][ray] = {"t": t_far, "triangle": NONE}
+
+    def test(self, thread):
+        """The packet in one triangle's space, some of its rays anyway."""
+        rng = self.rng
+        self.left[thread] -= 1
+        rays, records = self.rays[thread], self.records[thread]
+        mask = sum(1 << ray for ray in rng.sample(sorted(rays), rng.randrange(1, len(rays) + 1)))
+        token = random_token(rng, thread=thread, stack_depth=STACK_DEPTH, mask=mask,
+                             hit=sum(1 << ray for ray in records))
+        index, solid, own = rng.randrange(NUM_TRIANGLES), rng.randrange(2), rng.randrange(2)
+        instance = self.instances[thread] if token["level"] else NONE
+        packet = {"token": token, "index": index, "solid": solid}
+        numbers = rays_of(mask)
+        origin = None
+        for ray in numbers:
+            if origin is None or own:
+                origin = [rng.randrange(-4, 9) / 4 for _ in range(2)] + [rng.choice([-1, 1]) * rng.randrange(1, 16) / 4]
+                self.vectors.append(packet | {"is_origin": 1, "ray": ray, "first": int(ray == numbers[0]), "last": 0,
+                                              "vector": dict(zip("xyz", origin, strict=True))})
+            target = rng.randrange(4) / 4, rng.randrange(3) / 4, 0.0
+            # t is how often this fits in, often one of the limits.
+            scale = rng.choice([1.0, 1.0, 2.0, 4 / 3, 0.5, 0.25, -1.0])
+            direction = [self.arithmetic.round(scale * (end - begin))
+                         for end, begin in zip(target, origin, strict=True)]
+            self.vectors.append(packet | {"is_origin": 0, "ray": ray, "first": int(ray == numbers[0]),
+                                          "last": int(ray == numbers[-1]),
+                                          "vector": dict(zip("xyz", direction, strict=True))})
+            self.keep(thread, ray, index, instance, solid, origin, direction, token["level"])
+        self.expected[thread] = token | {"hit": sum(1 << ray for ray in records)}
+
+    def keep(self, thread, ray, index, instance, solid, origin, direction, level):
+        limits, records, events = self.rays[thread][ray], self.records[thread], self.events
+        t, u, v, _ = reference_test(self.arithmetic, origin, direction)
+        kept = records.get(ray, {}).get("t", math.inf)
+        if not (u >= 0 and v >= 0 and self.arithmetic.add(u, v) <= 1 and t < math.inf):
+            events["beside"] += 1
+        elif not (limits["t_near"] if self.near else 0) < t:
+            events["too near" if t > 0 else "behind"] += 1
+            events["just too near"] += t == limits["t_near"] > 0
+        elif (index, instance) == (limits["triangle"], limits["instance"]):
+            events["excluded inside of an instance" if level else "excluded"] += 1
+        elif not t < kept:
+            events["over" if kept == 0 else "as far" if t == kept else "too far"] += 1
+            events["beyond t_far"] += records[ray]["triangle"] == NONE
+        else:
+            over = solid and limits["any_hit"]
+            events["is over" if over else "passes through" if limits["any_hit"] else "closest"] += 1
+            events["excluded but for its instance"] += index == limits["triangle"]
+            records[ray] = {"t": 0.0 if over else t, "u": u, "v": v, "cosine": direction[2], "triangle": index,
+                            "in_instance": level, "instance": instance if level else None}
+
+
+@pytest.mark.parametrize(("seed", "num_threads", "gap", "near"), [
+    (0, 1, 0.0, True), (1, 6, 0.3, True), (2, 12, 0.0, True), (3, 8, 0.0, False)])
+def test_limits(seed, num_threads, gap, near):
+    world = World(seed=seed, num_threads=num_threads, num_packets=90, near=near)
+    rng = world.rng
+    dut = Intersection(fmt=FMT, num_threads=num_threads, stack_depth=STACK_DEPTH, index_width=INDEX_WIDTH,
+                       latencies=LATENCIES, limited=True, near=near, num_readers=2)
+    tested = deque()
+    accepted = Counter()
+    idle, beginning = set(range(num_threads)), set()
+
+    async def work(ctx):
+        """Packets that are begun have their limits taken, then enter instances and are tested, again and again."""
+        while world.num_packets or any(world.left.values()) or world.expected:
+            ctx.set(dut.entered.valid, 0)
+            for thread in [thread for thread in beginning if accepted[thread] == len(world.rays[thread])]:
+                beginning.remove(thread)
+                idle.add(thread)
+                accepted[thread] = 0
+            thread = rng.choice(sorted(idle)) if idle else None
+            if thread is not None:
+                if not world.left[thread]:
+                    if world.num_packets:
+                        world.begin(thread)
+                        idle.remove(thread)
+                        beginning.add(thread)
+                elif thread not in world.instances or rng.random() < 0.4:
+                    world.instances[thread] = rng.randrange(2)
+                    ctx.set(dut.entered, {"valid": 1, "thread": thread, "index": world.instances[thread]})
+                else:
+                    world.test(thread)
+                    idle.remove(thread)
+            await ctx.tick()
+
+    async def read_hits(ctx):
+        while True:
+            if not tested:
+                await ctx.tick()
+                continue
+            token = tested.popleft()
+            thread = token.thread
+            assert fields(token) == world.expected[thread]
+            ctx.set(dut.hit_address, thread)
+            for ray, record in world.records[thread].items():
+                reader = rng.randrange(2)
+                ctx.set(dut.record_address[reader], {"thread": thread, "ray": ray})
+                await ctx.tick().repeat(2)
+                got = ctx.get(dut.record[reader])
+                assert same(ctx.get(dut.hit_distances[ray]), record["t"])
+                for name, expected in record.items():
+                    if expected is not None:
+                        assert same(float(got[name]), float(expected)), name
+                num_records[0] += 1
+            del world.expected[thread]
+            idle.add(thread)
+
+    num_records = [0]
+    simulate(dut, work, name="limits", background=(
+        read_hits, feed(dut.limit, world.limits, rng=rng, gap=gap), log_accepted(dut, accepted),
+        feed(dut.vector, world.vectors, rng=rng, gap=gap), drain(dut.tested, tested.append)))
+    events = world.events
+    for event in ("beside", "behind", "too near", "just too near", "excluded", "excluded inside of an instance",
+                  "excluded but for its instance", "over", "as far", "too far", "beyond t_far", "is over",
+                  "passes through", "closest"):
+        assert events[event] > 2 or "near" in event, event
+    assert min(events["too near"], events["just too near"]) > 2 if near else not events["too near"]
+    assert num_records[0] > 200
+
+
+def log_accepted(dut, accepted):
+    async def testbench(ctx):
+        async for _, _, taken, thread in ctx.tick().sample(dut.limit.valid & dut.limit.ready, dut.limit.payload.thread):
+            accepted[thread] += taken
+    return testbench
