@@ -1,10 +1,13 @@
 """Several frames on one chip, whose memories are written while it draws."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from rtl.config import ChipConfig
 from sim.machine import SimulationError, render_frames
@@ -81,6 +84,16 @@ def test_frames_of_full_shading():
             assert upload["between"] == {"records": 36}
             assert upload["ahead"]["records"] == 36 * (10 + 15)
     assert (frames[0].color != frames[1].color).mean() > 0.5
+
+
+def test_the_example_of_the_documentation(tmp_path, monkeypatch):
+    page = Path(__file__).parents[3] / "docs" / "moving.md"
+    monkeypatch.chdir(tmp_path)
+    exec(re.search(r"```python\n(.*?)```", page.read_text(), re.DOTALL)[1], {})
+    pictures = [np.asarray(Image.open(tmp_path / f"lift-{number}.png")).astype(int) for number in range(4)]
+    # What moves is seen to move, and further each time.
+    differ = [(picture != pictures[0]).any(axis=2).sum() for picture in pictures[1:]]
+    assert 0 < differ[0] < differ[2]
 
 
 def test_no_frames():
