@@ -81,8 +81,19 @@ def killed_by(fault, tree):
         return run_tests(folder, nearest=NEAREST.get(fault.file) if fault else None)
 
 
+def merged(path, found):
+    """Rows of all faults that have been planted, now or in the results before, in the order of the list."""
+    earlier = json.loads(path.read_text())["mutants"] if path.exists() else []
+    known = {(row["file"], row["fault"]): row["killed_by"] for row in earlier}
+    known |= {(fault.file, fault.what): test for fault, test in found.items()}
+    places = [(fault.file, fault.what) for fault in FAULTS]
+    return [{"file": file, "fault": what, "killed_by": known[file, what]}
+            for file, what in places if (file, what) in known]
+
+
 @click.command()
-@click.option("--only", default="", help="Only faults whose file or description contains this")
+@click.option("--only", default="", help="Only faults whose file or description contains this; what the output has of "
+              "others is kept")
 @click.option("--jobs", default=2, show_default=True, type=click.IntRange(min=1), help="How many at a time")
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="Where the result goes as JSON")
 def main(only, jobs, output):
@@ -118,10 +129,9 @@ def main(only, jobs, output):
     num_killed = sum(test is not None for test in found)
     console.print(f"{num_killed} of {len(faults)} killed")
     if output:
-        rows = [{"file": fault.file, "fault": fault.what, "killed_by": test}
-                for fault, test in zip(faults, found, strict=True)]
-        result = {"score": num_killed / len(faults), "amaranth": importlib.metadata.version("amaranth"),
-                  "mutants": rows}
+        rows = merged(output, dict(zip(faults, found, strict=True)))
+        score = sum(row["killed_by"] is not None for row in rows) / len(rows)
+        result = {"score": score, "amaranth": importlib.metadata.version("amaranth"), "mutants": rows}
         with written_whole(output) as whole:
             whole.write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n")
     if num_killed < len(faults):

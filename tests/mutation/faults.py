@@ -83,8 +83,6 @@ _BY_FILE = {
         ("tie = ~sticky & Mux(above_two, guard == 0b10, guard[0])", "tie = Const(0, 1)", "ties go up, not to even"),
         ("injected = [(ChainBit.SUBTRACT, guard[0], above_two, 0), (ChainBit.ADD, guard[1], above_two, 0)]",
          "injected = [(ChainBit.ADD, guard, Const(1, 2), 0)]", "half a unit is injected a place too low above two"),
-        ("Cat(~above_two & s.negative, above_two & s.negative)", "Cat(s.negative, Const(0, 1))",
-         "when truncating, one less is taken a place too low above two"),
         ("base, added = s.exp_above, (~above_two).as_signed()", "base, added = s.exp_above, Const(0, 1).as_signed()",
          "a quotient below one keeps the exponent of one above"),
         ("base, added = s.exp, Cat(above_two, s.exp_offset).as_signed()",
