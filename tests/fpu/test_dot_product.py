@@ -41,7 +41,8 @@ def expected(fmt, guard_width, factors, addend, *, truncate):
 
 
 def samples(fmt, count, seed):
-    """Rows of a₀ … a₂, b₀ … b₂, c: any patterns, near exponents, and terms that cancel, some all but one."""
+    """Rows of a₀ … a₂, b₀ … b₂, c: any patterns, near exponents, terms that cancel, some all but one, and zeros times
+    the largest number beside small terms."""
     rng = np.random.default_rng(seed)
     bits = rng.integers(0, 1 << fmt.width, (count, 7))
     near = np.clip(fmt.bias + rng.integers(-12, 13, (count, 7)) * rng.integers(0, 3, (count, 1)), 1, fmt.exp_inf - 1)
@@ -54,6 +55,11 @@ def samples(fmt, count, seed):
     almost = fmt.quantize(np.where(np.isnan(almost), 0.0, almost))
     rows[cancel, 3] = 1.0
     rows[cancel, 6] = -almost[cancel]
+    for row in np.flatnonzero(rng.random(count) < 0.1):
+        small = 2.0 ** -round(0.3 * fmt.bias)
+        rows[row] = rng.uniform(1, 2, 7) * np.array([small] * 6 + [small * small])
+        place = rng.integers(3)
+        rows[row, [place, 3 + place]] = rng.permutation([0.0, fmt.max]) * rng.choice([-1.0, 1.0], 2)
     return fmt.quantize(rows)
 
 
