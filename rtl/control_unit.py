@@ -44,7 +44,7 @@ class ControlUnit(wiring.Component):
         self._bank_bits = bank_bits
         self._num_rays = PACKET_RAYS * thread_slots(num_threads, bank_bits)
         self._conditions = {line["condition"] for line in program.instructions if line["op"] is Op.BRANCH}
-        self._ops = {line["op"] for line in program.instructions}
+        self._ops = program.ops
         self._lanes = lanes = lanes_layout(fmt)
         self._token = token = ray_token_layout(num_threads=num_threads, program=program, stack_depth=stack_depth)
         self._result = result_layout(token, lanes)

@@ -1,18 +1,17 @@
 """DynRTC, the dynamic ray-tracing core: pipelines behind one ray generation controller and one memory."""
 
 from amaranth.hdl import Cat, Module, Signal
-from amaranth.lib import data, stream, wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from .cache import WORD_WIDTH
 from .config import ChipConfig
 from .counters import Counters
 from .dynrtp import DynRTP
 from .layout import camera_layout
 from .line_sharing import LineSharing
-from .memory_ports import memory_ports
+from .memory_ports import memory_members, memory_ports
 from .observation import UNITS, event_names
-from .queue import Merge
+from .queue import merged
 from .ray_generation import RayGeneration
 from .write_out import WriteOut
 
@@ -48,10 +47,6 @@ class DynRTC(wiring.Component):
         self._pipelines = [DynRTP(config) for _ in range(config.num_pipelines)]
         self._names = counter_names(config)
         pipeline = self._pipelines[0]
-        members = {}
-        for name, (_, line_width) in memory_ports(config).items():
-            members[f"{name}_request"] = Out(stream.Signature(line_width))
-            members[f"{name}_data"] = In(stream.Signature(WORD_WIDTH, always_ready=True))
         super().__init__({
             "start": In(1),
             "ready": Out(1),
@@ -60,7 +55,7 @@ class DynRTC(wiring.Component):
             "width": In(config.coord_width),
             "height": In(config.coord_width),
             "background": In(24),
-            **members,
+            **memory_members(config),
             "pixel": Out(pipeline.pixel.signature),
             "counters": Out(data.StructLayout({name: 32 for name in self._names})),
             "probe": Out(data.ArrayLayout(pipeline.probe.shape().elem_shape, len(UNITS) * config.num_pipelines)),
@@ -79,13 +74,7 @@ class DynRTC(wiring.Component):
                          for name in ("camera", "root", "width", "height", "background")]
             m.d.comb += [self.probe[number * len(UNITS) + unit].eq(pipeline.probe[unit]) for unit in range(len(UNITS))]
         self._share_memories(m)
-        if len(pipelines) == 1:
-            pixels = pipelines[0].pixel
-        else:
-            m.submodules.pixels = merge = Merge(self.pixel.payload.shape(), num_inputs=len(pipelines))
-            for pipeline, target in zip(pipelines, merge.i, strict=True):
-                wiring.connect(m, pipeline.pixel, target)
-            pixels = merge.o
+        pixels = merged(m, "pixels", [pipeline.pixel for pipeline in pipelines])
         wiring.connect(m, pixels, wiring.flipped(self.pixel))
 
         # A picture begins with empty caches: the scene may be another.

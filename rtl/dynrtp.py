@@ -18,10 +18,10 @@ from .layout import (
     with_token,
 )
 from .mailboxed_list import MailboxedList
-from .memory_ports import cache_names, memory_ports
+from .memory_ports import cache_names, memory_members
 from .microcode import lane_width
 from .observation import UNITS, events_layout, observe
-from .queue import Merge, Queue
+from .queue import Queue, merged
 from .ray_generation import packet_layout
 from .ray_store import RayStore
 from .requests import shader_shapes
@@ -66,10 +66,6 @@ class DynRTP(wiring.Component):
         self._has_shader = config.program is not None
         self._job = job_layout(self._token, index_width=config.index_width, solid=self._has_shader)
         fmt = config.fmt
-        members = {}
-        for name, (_, line_width) in memory_ports(config).items():
-            members[f"{name}_request"] = Out(stream.Signature(line_width))
-            members[f"{name}_data"] = In(stream.Signature(WORD_WIDTH, always_ready=True))
         super().__init__({
             "camera": In(camera_layout(fmt)),
             "root": In(config.index_width),
@@ -80,7 +76,7 @@ class DynRTP(wiring.Component):
             "flushed": Out(1),
             "ready": Out(1),
             "packet": In(stream.Signature(packet_layout(config.coord_width))),
-            **members,
+            **memory_members(config),
             "pixel": Out(stream.Signature(pixel_layout(fmt=fmt, index_width=config.index_width,
                                                        coord_width=config.coord_width))),
             "events": Out(events_layout(config)),
@@ -94,13 +90,6 @@ class DynRTP(wiring.Component):
         m.submodules[f"{name}_queue"] = queue
         m.d.comb += [queue.i.payload.eq(source.payload), queue.i.valid.eq(source.valid)]
         return queue.o
-
-    def _merge(self, m, name, sources, shape):
-        merge = Merge(shape, num_inputs=len(sources))
-        m.submodules[f"{name}_merge"] = merge
-        for source, target in zip(sources, merge.i, strict=True):
-            wiring.connect(m, source, target)
-        return merge.o
 
     def _cache(self, m, name, **parameters):
         """A cache between its memory's port and whoever asks it."""
@@ -217,11 +206,11 @@ class DynRTP(wiring.Component):
         if self._has_shader:
             self._scene_start = stream.Signature(self._node, always_ready=True).create(path=("scene_start",))
             starts.append(self._queue(m, "scene_start", self._scene_start, self._node))
-        visits = self._merge(m, "visit", [
+        visits = merged(m, "visit_merge", [
             self._queue(m, "child", traversal.child, self._node),
             self._queue(m, "resume", stack.resume, self._node),
             *starts,
-        ], self._node)
+        ])
         nodes = caches["nodes"]
         m.d.comb += [
             nodes.request.valid.eq(visits.valid),
@@ -248,10 +237,10 @@ class DynRTP(wiring.Component):
         wiring.connect(m, transformation.vector, intersection.vector)
         wiring.connect(m, self._queue(m, "tested", intersection.tested, self._token), mailboxed_list.tested)
 
-        pops = self._merge(m, "pop", [
+        pops = merged(m, "pop_merge", [
             self._queue(m, "nowhere", traversal.pop, self._token),
             self._queue(m, "list_end", mailboxed_list.pop, self._token),
-        ], self._token)
+        ])
         wiring.connect(m, pops, stack.pop)
 
         # An instance that is left goes on with its list; a packet that is left is to be coloured.

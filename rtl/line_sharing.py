@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 from amaranth.utils import ceil_log2
 
 from .cache import WORD_WIDTH
-from .queue import Merge, Queue
+from .queue import Queue, merged
 
 __all__ = ["LineSharing"]
 
@@ -44,17 +44,16 @@ class LineSharing(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.merge = merge = Merge(self.line_request.payload.shape(), num_inputs=self._num_users)
         m.submodules.owners = owners = Queue(max(ceil_log2(self._num_users), 1), always_ready=True,
                                              depth=self._num_users * self._num_fetches)
         number = Signal(range(self._num_users))
         word = Signal(range(self._line_words))
         last = Signal()
-        for user, (request, target) in enumerate(zip(self.request, merge.i, strict=True)):
-            wiring.connect(m, wiring.flipped(request), target)
+        for user, request in enumerate(self.request):
             with m.If(request.valid & request.ready):
                 m.d.comb += number.eq(user)
-        wiring.connect(m, merge.o, wiring.flipped(self.line_request))
+        requests = merged(m, "merge", [wiring.flipped(request) for request in self.request])
+        wiring.connect(m, requests, wiring.flipped(self.line_request))
         m.d.comb += [
             owners.i.payload.eq(number),
             owners.i.valid.eq(self.line_request.valid & self.line_request.ready),

@@ -1,10 +1,13 @@
 """The memories that a chip reads."""
 
+from amaranth.lib import stream
+from amaranth.lib.wiring import In, Out
+
 from .cache import WORD_WIDTH
 from .layout import NODE_BITS, matrix_layout
 from .microcode import Op, lane_width
 
-__all__ = ["cache_names", "memory_ports"]
+__all__ = ["cache_names", "memory_members", "memory_ports"]
 
 
 def cache_names(config):
@@ -12,7 +15,7 @@ def cache_names(config):
     names = ["nodes", "lists", "matrices"]
     if config.program is not None:
         names.append("shading")
-        if any(line["op"] is Op.TEXTURE for line in config.program.instructions):
+        if Op.TEXTURE in config.program.ops:
             names.append("textures")
     return tuple(names)
 
@@ -33,3 +36,12 @@ def memory_ports(config):
     if "textures" in cache_names(config):
         ports["textures"] = port(config.texture_line_items, config.texture_line_items)
     return ports
+
+
+def memory_members(config):
+    """Members for :func:`memory_ports`: of each the stream ``NAME_request`` of lines, and ``NAME_data`` of words."""
+    members = {}
+    for name, (_, line_width) in memory_ports(config).items():
+        members[f"{name}_request"] = Out(stream.Signature(line_width))
+        members[f"{name}_data"] = In(stream.Signature(WORD_WIDTH, always_ready=True))
+    return members

@@ -177,6 +177,11 @@ class Program:
     literals: tuple
     labels: dict = field(default_factory=dict)
 
+    @property
+    def ops(self):
+        """Operations that it has: what is to be built."""
+        return frozenset(instruction["op"] for instruction in self.instructions)
+
 
 class Assembler:
     """Writes a program down, an instruction a call.

@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from fpu import Delay, IntToFloat
 
 from .layout import PACKET_RAYS, thread_width, token_layout, with_token
+from .lowest_ray import lowest_ray
 from .queue import Queue
 
 __all__ = ["NewRays"]
@@ -53,16 +54,12 @@ class NewRays(wiring.Component):
         m.submodules.queue = queue = Queue(self._result, depth=_QUEUE_DEPTH, always_ready=True)
         packet = self.primary.payload
         done = Signal(PACKET_RAYS)
-        remaining, others = Signal(PACKET_RAYS), Signal(PACKET_RAYS)
-        ray = Signal(range(PACKET_RAYS))
+        remaining = Signal(PACKET_RAYS)
+        ray, others = lowest_ray(m, remaining)
         pending = Signal(range(_QUEUE_DEPTH + 1))
         has_room, issue, is_first = Signal(), Signal(), Signal()
-        for number in reversed(range(PACKET_RAYS)):
-            with m.If(remaining[number]):
-                m.d.comb += ray.eq(number)
         m.d.comb += [
             remaining.eq(packet.token.mask & ~done),
-            others.eq(remaining & (remaining - 1)),
             is_first.eq(~done.any()),
             has_room.eq(pending < _QUEUE_DEPTH),
             self.begin.valid.eq(self.primary.valid & is_first & has_room),

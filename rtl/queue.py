@@ -4,7 +4,7 @@ from amaranth.hdl import Assert, Module, Mux, Shape, Signal
 from amaranth.lib import fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-__all__ = ["Merge", "Queue"]
+__all__ = ["Merge", "Queue", "merged"]
 
 
 class Queue(wiring.Component):
@@ -97,3 +97,14 @@ class Merge(wiring.Component):
                             ]
                             m.d.sync += turn.eq(Mux(self.o.ready, (number + 1) % self._num_inputs, number))
         return m
+
+
+def merged(m, name, sources):
+    """One stream of several, by a :class:`Merge` that is the submodule ``name`` of ``m``; of one, itself."""
+    first, *others = sources
+    if not others:
+        return first
+    m.submodules[name] = merge = Merge(first.payload.shape(), num_inputs=len(sources))
+    for source, target in zip(sources, merge.i, strict=True):
+        wiring.connect(m, source, target)
+    return merge.o

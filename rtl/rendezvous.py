@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from .instruction_fetch import ray_token_layout
 from .intersection import limits_layout
 from .layout import PACKET_RAYS, IntervalSource, thread_slots, thread_width, token_layout
+from .lowest_ray import lowest_ray
 from .pixel_encoder import ended_layout
 from .register_file import lanes_layout
 
@@ -164,18 +165,14 @@ class Rendezvous(wiring.Component):
         read, write = kept.read_port(), kept.write_port()
         packet = self.packet.payload
         done = Signal(PACKET_RAYS)
-        remaining, others = Signal(PACKET_RAYS), Signal(PACKET_RAYS)
-        ray = Signal(range(PACKET_RAYS))
-        for number in reversed(range(PACKET_RAYS)):
-            with m.If(remaining[number]):
-                m.d.comb += ray.eq(number)
+        remaining = Signal(PACKET_RAYS)
+        ray, others = lowest_ray(m, remaining)
         reading, moves = Signal(), Signal()
         token = Signal(self._ray, reset_less=True)
         m.d.comb += [
             # A packet's mask has lost rays on the way; all that are to come back have been counted as running.
             remaining.eq(running.data.running & ~done),
             running.addr.eq(packet.thread[self._bank_bits:]),
-            others.eq(remaining & (remaining - 1)),
             moves.eq(self.packet.valid & (~reading | self.ray.ready)),
             self.packet.ready.eq(moves & ~others.any()),
             read.addr.eq(Cat(ray, packet.thread[self._bank_bits:])),

@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from .layout import vector_layout
 from .microcode import lane_width
-from .queue import Merge
+from .queue import merged
 
 __all__ = ["WriteBack", "in_lanes", "result_layout"]
 
@@ -43,7 +43,6 @@ class WriteBack(wiring.Component):
 
     def __init__(self, *, fmt, num_inputs, tag, result):
         self._fmt = fmt
-        self._num_inputs = num_inputs
         self._result = result
         super().__init__({
             "i": In(stream.Signature(result)).array(num_inputs),
@@ -53,12 +52,10 @@ class WriteBack(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.merge = merge = Merge(self._result, num_inputs=self._num_inputs)
-        for source, target in zip(self.i, merge.i, strict=True):
-            wiring.connect(m, wiring.flipped(source), target)
+        taken = merged(m, "merge", [wiring.flipped(source) for source in self.i])
         result, valid = Signal(self._result, reset_less=True), Signal()
-        m.d.comb += [merge.o.ready.eq(~self.stepped.valid), self.o.valid.eq(valid), self.o.result.eq(result)]
-        m.d.sync += [result.eq(merge.o.payload), valid.eq(merge.o.valid | self.stepped.valid)]
+        m.d.comb += [taken.ready.eq(~self.stepped.valid), self.o.valid.eq(valid), self.o.result.eq(result)]
+        m.d.sync += [result.eq(taken.payload), valid.eq(taken.valid | self.stepped.valid)]
         with m.If(self.stepped.valid):
             tag, vector = self.stepped.tag, self.stepped.vector
             m.d.sync += [result.token.eq(tag.token), result.last.eq(1), result.dst.eq(tag.dst),

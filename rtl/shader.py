@@ -4,6 +4,8 @@ from amaranth.hdl import Cat, Const, Module, Signal
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from fpu import Delay
+
 from .color_unit import ColorUnit
 from .control_unit import CONTROL_OPS, ControlUnit
 from .instruction_fetch import InstructionFetch, ray_token_layout
@@ -15,7 +17,7 @@ from .pixel_encoder import PixelEncoder
 from .queue import Queue
 from .register_file import lanes_layout
 from .rendezvous import Rendezvous, stop_layout
-from .requests import Unpack, shader_shapes
+from .requests import Unpack, shader_shapes, tag_layout
 from .results import WriteBack, in_lanes, result_layout
 from .step import put_step, step_layout
 
@@ -66,7 +68,7 @@ class Shader(wiring.Component):
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, coord_width, program, ray_stack_depth,
                  offset_log2=1, bank_bits=0):
         self._fmt = fmt
-        self._ops = {instruction["op"] for instruction in program.instructions}
+        self._ops = program.ops
         token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         rays = dict(num_threads=num_threads, program=program)
         self._ray = ray_token_layout(**rays, stack_depth=ray_stack_depth)
@@ -173,23 +175,22 @@ class Shader(wiring.Component):
 
     def _color_results(self, m, out, following, rooms):
         m.submodules.color = color = self._color
-        beside = data.StructLayout({"valid": 1, "token": self._ray, "dst": 5, "mask": 3})
-        stages = [Signal(beside, name=f"color{stage}") for stage in range(color.latency + 1)]
+        m.submodules.color_tag = beside = Delay(tag_layout(self._ray), cycles=color.latency)
+        valid = Signal(color.latency + 1, name="color_valid")
         result = Signal(self._result)
         m.d.comb += [
             color.op.eq(out.instruction.op),
             color.a.eq(out.a),
             color.x.eq(out.x),
-            stages[0].valid.eq(out.valid & self._is_one_of(out.instruction.op, _COLOR_OPS)),
-            *self._tagged(stages[0], out, following),
-            *(result[name].eq(stages[-1][name]) for name in ("token", "dst", "mask")),
+            valid[0].eq(out.valid & self._is_one_of(out.instruction.op, _COLOR_OPS)),
+            *self._tagged(beside.i, out, following),
+            *(result[name].eq(beside.o[name]) for name in ("token", "dst", "mask")),
             result.last.eq(1),
             result.value.eq(color.r),
         ]
-        for stage in range(color.latency):
-            m.d.sync += stages[stage + 1].eq(stages[stage])
-        stream_, begun = self._result_queue(m, "color", stages[-1].valid, result, rooms, latency=color.latency)
-        m.d.comb += begun.eq(stages[0].valid)
+        m.d.sync += valid[1:].eq(valid[:-1])
+        stream_, begun = self._result_queue(m, "color", valid[-1], result, rooms, latency=color.latency)
+        m.d.comb += begun.eq(valid[0])
         return stream_
 
     def _tagged(self, tag, out, following):

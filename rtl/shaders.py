@@ -7,7 +7,7 @@ from amaranth.utils import exact_log2
 
 from .layout import with_token
 from .microcode import Op
-from .queue import Merge, Queue
+from .queue import Queue, merged
 from .shader import Shader
 
 __all__ = ["Shaders"]
@@ -39,7 +39,7 @@ class Shaders(wiring.Component):
         self._bank_bits = exact_log2(num_shaders)
         self._num_threads = parameters["num_threads"]
         self._shaders = [Shader(**parameters, bank_bits=self._bank_bits) for _ in range(num_shaders)]
-        self._has_textures = any(line["op"] is Op.TEXTURE for line in parameters["program"].instructions)
+        self._has_textures = Op.TEXTURE in parameters["program"].ops
         members = self._shaders[0].signature.members
         super().__init__({
             **members,
@@ -63,7 +63,8 @@ class Shaders(wiring.Component):
         m.d.comb += [self.idle.eq(Cat(shader.idle for shader in shaders).all()),
                      self.busy.eq(sum(shader.busy for shader in shaders))]
         for name in ("step", "limit", "load", "pixel", *(["texture"] if self._has_textures else [])):
-            self._merge(m, name)
+            streams = [getattr(shader, name) for shader in shaders]
+            wiring.connect(m, merged(m, f"{name}_merge", streams), wiring.flipped(getattr(self, name)))
         self._distribute(m, "primary", lambda payload: payload.token.thread)
         self._distribute(m, "packet", lambda payload: payload.thread)
         self._distribute(m, "loaded", lambda payload: payload.payload.token.thread)
@@ -71,18 +72,6 @@ class Shaders(wiring.Component):
             self._distribute(m, "texel", lambda payload: payload.payload.token.thread)
         self._take_turns(m)
         return m
-
-    def _merge(self, m, name):
-        """A stream of all shaders."""
-        target = wiring.flipped(getattr(self, name))
-        if len(self._shaders) == 1:
-            wiring.connect(m, getattr(self._shaders[0], name), target)
-            return
-        merge = Merge(target.payload.shape(), num_inputs=len(self._shaders))
-        m.submodules[f"{name}_merge"] = merge
-        for shader, source in zip(self._shaders, merge.i, strict=True):
-            wiring.connect(m, getattr(shader, name), source)
-        wiring.connect(m, merge.o, target)
 
     def _distribute(self, m, name, thread):
         """A stream to the shader whose thread it is about."""
@@ -105,19 +94,17 @@ class Shaders(wiring.Component):
             return
         token = self.start.payload.shape()
         for name, shape in (("start", with_token(token, shared=1)), ("finished", with_token(token))):
-            merge = Merge(shape, num_inputs=len(self._shaders))
-            m.submodules[f"{name}_merge"] = merge
-            for number, (shader, target) in enumerate(zip(self._shaders, merge.i, strict=True)):
+            waiting = []
+            for number, shader in enumerate(self._shaders):
                 queue = Queue(shape, depth=self._num_threads, always_ready=True)
                 m.submodules[f"{name}_queue{number}"] = queue
                 source = getattr(shader, name)
                 m.d.comb += [queue.i.payload.token.eq(source.payload), queue.i.valid.eq(source.valid)]
                 if name == "start":
                     m.d.comb += queue.i.payload.shared.eq(shader.shared.shared)
-                wiring.connect(m, queue.o, target)
-            out = getattr(self, name)
-            m.d.comb += [merge.o.ready.eq(1), out.payload.eq(merge.o.payload.token), out.valid.eq(merge.o.valid)]
+                waiting.append(queue.o)
+            turn, out = merged(m, f"{name}_merge", waiting), getattr(self, name)
+            m.d.comb += [turn.ready.eq(1), out.payload.eq(turn.payload.token), out.valid.eq(turn.valid)]
             if name == "start":
-                m.d.comb += [self.shared.valid.eq(merge.o.valid),
-                             self.shared.thread.eq(merge.o.payload.token.thread),
-                             self.shared.shared.eq(merge.o.payload.shared)]
+                m.d.comb += [self.shared.valid.eq(turn.valid), self.shared.thread.eq(turn.payload.token.thread),
+                             self.shared.shared.eq(turn.payload.shared)]

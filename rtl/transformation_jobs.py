@@ -5,6 +5,7 @@ from amaranth.lib import data, enum, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from .layout import PACKET_RAYS, camera_layout, job_layout, matrix_layout, thread_width, token_layout, with_token
+from .lowest_ray import lowest_ray
 from .microcode import Store
 from .ray_store import ray_store_ports
 from .step import step_layout
@@ -78,15 +79,10 @@ class TransformationJobs(wiring.Component):
         has_shader = self._has_shader
         shared = current.shared if has_shader else Const(1, 1)
         remaining = Signal(PACKET_RAYS, reset_less=True)
-        ray = Signal(range(PACKET_RAYS))
-        others = Signal(PACKET_RAYS)
+        ray, others = lowest_ray(m, remaining)
         last, boundary = Signal(), Signal()
-        for number in reversed(range(PACKET_RAYS)):
-            with m.If(remaining[number]):
-                m.d.comb += ray.eq(number)
         m.d.comb += [
-            # Without its lowest set bit; a mask is never empty, so an origin is never the last vector.
-            others.eq(remaining & (remaining - 1)),
+            # A mask is never empty, so an origin is never the last vector.
             last.eq(~origin_next & ~others.any()),
             boundary.eq(~active | last),
         ]

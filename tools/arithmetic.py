@@ -24,7 +24,7 @@ from sim.scene.compile import CompiledScene
 
 from .errors import clear_errors, written_whole
 from .first_light import SCENES
-from .fpu_report_page import between_markers, markdown_table
+from .page import check_places, filled_page, markdown_table
 
 __all__ = ["arithmetic"]
 
@@ -47,7 +47,7 @@ def _pictures(scenes, console):
         camera = (Camera(numbers["eye"], numbers["at"], numbers["up"], numbers["hfov_deg"]) if view else
                   scene.default_camera())
         golden = render_golden(scene, camera, *SIZE)
-        image = CompiledScene(scene, fmt=FORMAT).image(scene)
+        image = CompiledScene(scene, fmt=FORMAT).image(scene, eye=camera.eye)
         for number, arithmetic in enumerate(ARITHMETICS):
             frame = render_model(image, camera, *SIZE, config=replace(ChipConfig(), fmt=FORMAT, arithmetic=number))
             counts = frame.report["counts"]
@@ -97,6 +97,9 @@ def _page(results):
     return "\n".join(tables)
 
 
+_PARTS = {"arithmetic": _page}
+
+
 @click.command()
 @click.option("--scenes", type=click.Path(exists=True, file_okay=False, path_type=Path), required=True,
               help="Folder with the scenes and cameras.json")
@@ -110,13 +113,14 @@ def arithmetic(scenes, docs, seeds, jobs):
     console = Console(stderr=True, highlight=False)
     page = docs / "fpu.md"
     with clear_errors():
-        place_of_table = between_markers(page, "arithmetic")
+        # Before the long work
+        check_places(page, _PARTS)
         results = {"format": str(FORMAT), "size": list(SIZE), "grade": GRADE, "seeds": list(range(1, seeds + 1)),
                    "tools": versions(), "pictures": _pictures(scenes, console),
                    "datapaths": _areas(seeds, jobs, console)}
         (docs / "results").mkdir(exist_ok=True)
         with written_whole(docs / "results" / "arithmetic.json") as whole:
             whole.write_text(json.dumps(results, indent=1) + "\n")
-        table = f"\n{_page(results)}\n"
+        text = filled_page(page, _PARTS, results)
         with written_whole(page) as whole:
-            whole.write_text(place_of_table.sub(lambda match: table, page.read_text()))
+            whole.write_text(text)

@@ -1,10 +1,8 @@
 """The tables of ``docs/fpu.md``, each between two comments in the page's prose."""
 
-import re
+from .page import check_places, filled_page, markdown_table
 
-from .errors import BadInput
-
-__all__ = ["between_markers", "check_markers", "filled", "markdown_table"]
+__all__ = ["check_markers", "filled"]
 
 _CLOCK_MHZ = 175
 #: Most that an operator at 7.16 and its default depth is to take, in one of these ways; what is not named, none of it.
@@ -16,14 +14,6 @@ _TARGETS = {
     "TableDivider": ({"lut": 250, "dsp": 3, "ebr": 1},),
 }
 _RESOURCES = {"lut": "LUT", "ff": "FF", "dsp": "DSP", "ebr": "EBR"}
-
-
-def markdown_table(head, rows):
-    """Lines of a table, or that there is nothing to show."""
-    if not rows:
-        return "Not measured.\n"
-    lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
-    return "\n".join(lines + ["| " + " | ".join(map(str, row)) + " |" for row in rows]) + "\n"
 
 
 def _mhz(row):
@@ -165,44 +155,11 @@ _PARTS = {"flow": _flow, "default": _default, "targets": _targets, "depth": _dep
           "truncation": _truncation, "peers": _peers}
 
 
-def _between(name):
-    return re.compile(rf"(?<=<!-- begin: {name} -->\n).*?(?=^<!-- end: {name} -->$)", re.DOTALL | re.MULTILINE)
-
-
-def between_markers(page, name):
-    """Pattern of what stands at the place of the table ``name`` in ``page``.
-
-    Raises
-    ------
-    BadInput
-        If there is no page, or no such place.
-    """
-    try:
-        text = page.read_text()
-    except OSError as error:
-        raise BadInput(f"{page}: cannot be read: {error.strerror}") from error
-    if len(_between(name).findall(text)) != 1:
-        raise BadInput(f"{page}: must have the lines '<!-- begin: {name} -->' and '<!-- end: {name} -->' once, for "
-                       "the table between them")
-    return _between(name)
-
-
 def check_markers(page):
-    """Sees that every table has its place in ``page``.
-
-    Raises
-    ------
-    BadInput
-        If there is no page, or a place is missing.
-    """
-    for name in _PARTS:
-        between_markers(page, name)
+    """See :func:`~tools.page.check_places`."""
+    check_places(page, _PARTS)
 
 
 def filled(page, results):
-    """Text of ``page`` with the tables of ``results``."""
-    text = page.read_text()
-    for name, part in _PARTS.items():
-        table = f"\n{part(results)}\n"
-        text = _between(name).sub(lambda match: table, text)
-    return text
+    """See :func:`~tools.page.filled_page`."""
+    return filled_page(page, _PARTS, results)

@@ -1,6 +1,6 @@
 """Tables of docs/pipeline.md from results."""
 
-from .fpu_report_page import between_markers, markdown_table
+from .page import filled_page, markdown_table
 
 __all__ = ["filled"]
 
@@ -57,16 +57,5 @@ _PARTS = {"demos": _demos, "scaling": _scaling, "operators": _operators}
 
 
 def filled(page, results):
-    """Text of ``page`` with the tables of ``results``.
-
-    Raises
-    ------
-    BadInput
-        If the page or the place of a table is missing.
-    """
-    places = {name: between_markers(page, name) for name in _PARTS}
-    text = page.read_text()
-    for name, place in places.items():
-        table = f"\n{_PARTS[name](results)}\n"
-        text = place.sub(lambda match, table=table: table, text)
-    return text
+    """See :func:`~tools.page.filled_page`."""
+    return filled_page(page, _PARTS, results)

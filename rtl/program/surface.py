@@ -67,6 +67,16 @@ def _towards_viewer(w, side):
         w.rows(Reg.COSINE, Reg.NORMAL, Reg.DIRECTION, Reg.DIRECTION, Reg.DIRECTION)
 
 
+def _write_triangles_normal(w, known, *, seen_along):
+    """NORMAL of the flat triangle, ``known`` from there on, by the side that is seen."""
+    w.move(Reg.NORMAL, Reg.TRIANGLE)
+    if w.features.instances:
+        _to_world(w, known)
+        _unit(w)
+    w.label(known)
+    _towards_viewer(w, seen_along)
+
+
 def write_normal(w):
     """Of the hit: NORMAL, COSINE, POINT; D′z in HIT."""
     known = w.fresh("unit normal")
@@ -80,12 +90,7 @@ def write_normal(w):
         _unit(w)
         w.goto(known)
         w.label(flat)
-    w.move(Reg.NORMAL, Reg.TRIANGLE)
-    if w.features.instances:
-        _to_world(w, known)
-        _unit(w)
-    w.label(known)
-    _towards_viewer(w, (Reg.OWNER, Z))
+    _write_triangles_normal(w, known, seen_along=(Reg.OWNER, Z))
     w.columns(Reg.POINT, (Reg.HIT, (ONE, X, ZERO)), Reg.ORIGIN, Reg.DIRECTION)
     if w.features.shares:
         w.move(Reg.HIT, (Reg.OWNER, Z), mask=MY)
@@ -97,11 +102,5 @@ def write_flat_normal(w):
         return
     steady = w.fresh("steady")
     w.branch(Condition.NEGATIVE, (Reg.COSINE, X), steady)
-    known = w.fresh("unit normal")
-    w.move(Reg.NORMAL, Reg.TRIANGLE)
-    if w.features.instances:
-        _to_world(w, known)
-        _unit(w)
-    w.label(known)
-    _towards_viewer(w, (Reg.HIT, Y))
+    _write_triangles_normal(w, w.fresh("unit normal"), seen_along=(Reg.HIT, Y))
     w.label(steady)

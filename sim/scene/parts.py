@@ -7,6 +7,7 @@ import numpy as np
 
 from .error import SceneError
 from .kdtree import build_kdtree
+from .srgb import encode
 from .triangles import unit_triangle_maps
 
 __all__ = ["INSTANCE_COST", "Part", "color_words", "make_part", "tree_over"]
@@ -61,8 +62,7 @@ class Part:
 
 def color_words(materials):
     """uint32[M]: materials' colours, encoded, as simple shading reads them."""
-    linear = np.clip([material.base_color for material in materials], 0.0, 1.0)
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    encoded = encode([material.base_color for material in materials])
     red, green, blue = np.rint(255 * encoded).astype(np.uint32).T
     return red << 16 | green << 8 | blue
 
