@@ -129,8 +129,9 @@ class DotProduct(Operator):
         levels = range((window + 1).bit_length())
         return {
             **product_delays("multiply", fmt.sig_width, fmt.sig_width),
-            "mask": lut_delay(1), "pairs": carry_delay(fmt.exp_width + 1) + lut_delay(1),
-            "highest": carry_delay(fmt.exp_width + 1) + lut_delay(1),
+            # What is a zero, and which is higher, goes to all places of an exponent.
+            "mask": lut_delay(1.5), "pairs": carry_delay(fmt.exp_width + 1) + lut_delay(1.5),
+            "highest": carry_delay(fmt.exp_width + 1) + lut_delay(1.5),
             "distance": carry_delay(fmt.exp_width + 1) + lut_delay(2),
             # What chooses a shift goes to all places of a term.
             **{f"align_{level}": lut_delay(1.7) for level in levels[::-1]},

@@ -18,10 +18,12 @@ def normalise_delays(width):
     # A tree of tables that looks at 2^level bits, and the one that shifts; the last step shifts in the rounding.
     levels, delays = _normalise_levels(width), {}
     for level in levels:
+        look, shift = lut_delay((level + 1) // 2), lut_delay(int(level != levels[-1]))
         if level >= _WIDE_LEVEL:
-            delays[f"detect_{level}"] = lut_delay((level + 1) // 2)
-        delays[f"normalise_{level}"] = lut_delay((0 if level >= _WIDE_LEVEL else (level + 1) // 2)
-                                                 + (level != levels[-1]))
+            # What has been found goes to all places.
+            delays |= {f"detect_{level}": look, f"normalise_{level}": 2 * shift}
+        else:
+            delays[f"normalise_{level}"] = look + shift
     return delays
 
 

@@ -8,6 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 from fpu import FloatFormat, Reciprocal, ReciprocalSquareRoot, Rounding, SquareRoot, TableDivider
 from fpu.reciprocal_square_root import _roots
+from fpu.table import LineTable
 from tests.fpu import reference
 from tests.fpu.verilated import Bank
 
@@ -125,6 +126,16 @@ def test_lines_are_near_enough(frac_width):
     table = _roots(frac_width)
     radicands = np.concatenate([divisors, 2 * divisors])
     assert np.abs(table.values * 2.0 ** -table.value_width - radicands ** -0.5).max() < half_unit
+
+
+def test_lines_err_as_far_above_as_below():
+    """Which is what makes a line's largest error least."""
+    points, num_lines, value_width = 1 + np.arange(1 << 12) / (1 << 12), 16, 20
+    table = LineTable(lambda x: 1 / x, points, num_lines=num_lines, value_width=value_width)
+    errors = (table.values - 2.0 ** value_width / points).reshape(num_lines, -1)
+    # A line's value at its start is a whole number.
+    assert (np.abs(errors.max(1) + errors.min(1)) <= 1).all()
+    assert table.max_error == np.abs(errors).max() / 2 ** value_width < 2.0 ** -10
 
 
 @pytest.mark.parametrize("cls", [Reciprocal, ReciprocalSquareRoot, TableDivider])
