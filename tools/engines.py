@@ -130,13 +130,13 @@ def _frames(order, compiled, poses, is_moving, console):
         image = None
         for number, (scene, camera) in enumerate(poses):
             with progress_on(console, what) as progress:
-                eye = camera.eye if order.is_full else None
+                view = {"eye": camera.eye, "is_full": order.is_full}
                 update = seconds = None
                 if image is None:
-                    image = compiled.image(scene, eye=eye, background=order.background, slot=0 if is_moving else None)
+                    image = compiled.image(scene, **view, background=order.background, slot=0 if is_moving else None)
                 else:
                     begin = time.perf_counter()
-                    update = compiled.update(scene, slot=number & 1, eye=eye)
+                    update = compiled.update(scene, slot=number & 1, **view)
                     seconds = time.perf_counter() - begin
                     image = image.updated(update)
                 frame = _picture(order, image, camera, order.chip_for(compiled), progress)

@@ -88,7 +88,7 @@ def _measure(name, scene, camera, pictures, console):
     begin = time.perf_counter()
     compiled = CompiledScene(scene, fmt=config.fmt, stack_depth=config.stack_depth)
     built = time.perf_counter() - begin
-    image = compiled.image(scene)
+    image = compiled.image(scene, eye=camera.eye)
     frame = render_rtl(image, camera, *SIZE, config=config, progress=lambda text: console.print(f"  {text}"))
     begin = time.perf_counter()
     model = render_model(image, camera, *SIZE, config=config)
@@ -125,7 +125,7 @@ def _check(name, scene, camera, console):
     """The same picture, small, by chips of several sizes under memories of random latency."""
     runs = []
     compiled = CompiledScene(scene, fmt=ChipConfig().fmt)
-    image = compiled.image(scene)
+    image = compiled.image(scene, eye=camera.eye)
     for threads in THREADS:
         config = replace(ChipConfig(), num_threads=threads)
         model = render_model(image, camera, *CHECK_SIZE, config=config)

@@ -44,7 +44,7 @@ def _prepared(name, view):
     scene = load_scene(name)
     camera = scene.cameras[view] if scene.cameras else scene.default_camera()
     compiled = CompiledScene(scene, fmt=FORMAT)
-    return scene, camera, compiled.image(scene, eye=camera.eye)
+    return scene, camera, compiled.image(scene, eye=camera.eye, is_full=True)
 
 
 def _flip(reference, picture):

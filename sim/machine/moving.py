@@ -54,11 +54,9 @@ def render_frames(compiled, poses, width, height, *, config, background=(0, 0, 0
     if pose is None:
         return
 
-    def eye(camera):
-        return None if config.shader is None else camera.eye
-
     scene, camera = pose
-    image = compiled.image(scene, eye=eye(camera), background=background, slot=0)
+    is_full = config.shader is not None
+    image = compiled.image(scene, eye=camera.eye, is_full=is_full, background=background, slot=0)
     update, seconds, cycles, slot = None, None, None, 0
     with Bench(config, latency=latency, jitter=jitter, seed=seed, progress=progress) as bench:
         load_image(bench, image, config)
@@ -68,7 +66,7 @@ def render_frames(compiled, poses, width, height, *, config, background=(0, 0, 0
             if following is not None:
                 slot ^= 1
                 begin = time.perf_counter()
-                coming = compiled.update(following[0], slot=slot, eye=eye(following[1]))
+                coming = compiled.update(following[0], slot=slot, eye=following[1].eye, is_full=is_full)
                 coming_seconds = time.perf_counter() - begin
                 _write(bench, coming.ahead)
             frame, _, _ = draw_frame(bench, image, camera, width, height, config=config, background=background)

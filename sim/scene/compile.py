@@ -132,7 +132,7 @@ class CompiledScene:
         """The least :class:`~rtl.program.features.ShaderFeatures` that draw all that is in the scene."""
         return needed_features(self._scene, instances=not self.is_flat)
 
-    def image(self, scene, *, eye=None, background=(0, 0, 0), slot=None):
+    def image(self, scene, *, eye=None, is_full=False, background=(0, 0, 0), slot=None):
         """The memory image with the instances where ``scene`` has them.
 
         Parameters
@@ -140,8 +140,10 @@ class CompiledScene:
         scene : Scene
             The scene that was compiled, or it at another time.
         eye : float64[3], optional
-            Where the camera is, for an image with the records of full shading: a scene without lights is lit from
-            there.
+            Where the camera is: instances are placed as seen from there, which leaves most bits to those nearby. A
+            scene that is flat stays where it is. Full shading lights scenes without lights from there.
+        is_full : bool
+            Whether with the records of full shading, which wants an ``eye``, or for simple shading.
         background : tuple of int
             Of full shading: sRGB-encoded bytes that rays see that hit nothing.
         slot : int, optional
@@ -154,18 +156,18 @@ class CompiledScene:
             If an instance's transform does not fit the format, the image does not fit the memory, or instances move
             of a scene that is flat.
         """
-        top = self._top_level(scene, slotted=slot is not None)
+        top = self._top_level(scene, eye, slotted=slot is not None)
         layout = self.slots if slot is not None else MemoryLayout(
             1, len(self._shown), top.num_nodes if top else 0, top.num_entries if top else 0)
-        static = self._static(layout, eye is not None, background)
+        static = self._static(layout, is_full, background)
         return static.image.updated(self._update(scene, top, static, slot or 0, eye))
 
-    def update(self, scene, *, slot, eye=None):
+    def update(self, scene, *, slot, eye=None, is_full=False):
         """What has to be uploaded for a frame, to a memory with an image that has slots.
 
         Parameters
         ----------
-        scene, eye
+        scene, eye, is_full
             As for :meth:`image`.
         slot : int
             0 or 1; the frame that is being drawn has the other.
@@ -179,10 +181,10 @@ class CompiledScene:
         SceneError
             As :meth:`image`.
         """
-        static = self._static(self.slots, eye is not None, None)
-        return self._update(scene, self._top_level(scene, slotted=True), static, slot, eye)
+        static = self._static(self.slots, is_full, None)
+        return self._update(scene, self._top_level(scene, eye, slotted=True), static, slot, eye)
 
-    def _top_level(self, scene, *, slotted=False):
+    def _top_level(self, scene, eye=None, *, slotted=False):
         """The frame's top level, None of a flat scene."""
         if self.is_flat:
             for before, now in zip(self._scene.instances, scene.instances, strict=True):
@@ -192,7 +194,7 @@ class CompiledScene:
             return None
         room = (self.slots.top_nodes, self.slots.top_entries) if slotted else None
         return top_level(scene, shown=self._shown, boxes=[part and part.box for part in self._parts],
-                         spaces=self._spaces, fmt=self._fmt, max_depth=self._stack_depth, room=room)
+                         spaces=self._spaces, fmt=self._fmt, max_depth=self._stack_depth, eye=eye, room=room)
 
     def _update(self, scene, top, static, slot, eye):
         layout, ahead, between = static.layout, [], []
@@ -207,7 +209,9 @@ class CompiledScene:
             ahead += [Piece("nodes", layout.first_node(slot), nodes),
                       Piece("lists", layout.first_entry(slot), entries),
                       Piece("matrices", first, pack_fields(fields, self._fmt.width))]
-        if eye is not None:
+        if static.image.records is not None:
+            if eye is None:
+                raise ValueError("full shading needs the eye")
             count = num_lights(scene)
             if count != num_lights(self._scene):
                 raise SceneError(f"scene has {count} lights, but had {num_lights(self._scene)} when it was compiled; "
@@ -301,9 +305,9 @@ class CompiledScene:
                 for k, placed in enumerate(scene.instances)]
 
 
-def compile_scene(scene, **options):
+def compile_scene(scene, *, eye=None, **options):
     """The memory image of a scene that stands still: :class:`CompiledScene` and its image in one."""
     compiled = CompiledScene(scene, **options)
-    image = compiled.image(scene)
+    image = compiled.image(scene, eye=eye)
     scene.warnings.extend(compiled.warnings)
     return image

@@ -11,10 +11,12 @@ from .parts import INSTANCE_COST, tree_over
 __all__ = ["TopLevel", "top_level", "unit_box"]
 
 
-def unit_box(lower, upper):
-    """Center, and the power of two that brings the box within [−1, 1]; so scaling is exact."""
-    half = float(np.max(upper - lower)) / 2
-    return (lower + upper) / 2, 2.0 ** -math.ceil(math.log2(half)) if half > 0 else 1.0
+def unit_box(lower, upper, *, center=None):
+    """Center, by default the box's, and the power of two that brings the box within [−1, 1]; so scaling is exact."""
+    if center is None:
+        center = (lower + upper) / 2
+    half = float(np.max(np.maximum(upper - center, center - lower)))
+    return center, 2.0 ** -math.ceil(math.log2(half)) if half > 0 else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +53,11 @@ class TopLevel:
         return len(self.tree.items)
 
 
-def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, room=None):
+def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, eye=None, room=None):
     """The top level of a scene as it stands.
+
+    Instances are off by units in the last place of their distance from the center, which is the eye where it is known:
+    then all by the same angle, as the eye sees them.
 
     Parameters
     ----------
@@ -66,6 +71,8 @@ def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, room=None):
     fmt : FloatFormat
     max_depth : int
         Bound of the tree's depth.
+    eye : float64[3], optional
+        Where the camera is.
     room : (int, int), optional
         Nodes and list entries that the tree must not exceed, at least 2 and the number of instances: where it would, it
         is kept shallower, at the cost of rays that visit more instances than they need to.
@@ -79,7 +86,7 @@ def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, room=None):
     SceneError
         If an instance's transform does not fit the format.
     """
-    center, scale = unit_box(*scene.bounds())
+    center, scale = unit_box(*scene.bounds(), center=None if eye is None else np.array(eye, np.float64))
     placed = [scene.instances[number] for number in shown]
     meshes = [instance.mesh for instance in placed]
     transforms = np.array([instance.transform for instance in placed])

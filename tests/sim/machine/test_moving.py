@@ -36,7 +36,7 @@ def test_frames_of_key_frames():
     assert len(frames) == 4
     for number, ((image, frame), (pose, camera)) in enumerate(zip(frames, poses, strict=True)):
         # Its own image is that of a slot; the picture is that of any image of the scene.
-        alone = render_model(compiled.image(pose), camera, *size, config=config, background=(1, 2, 3))
+        alone = render_model(compiled.image(pose, eye=camera.eye), camera, *size, config=config, background=(1, 2, 3))
         assert not frame.differs(alone).any()
         assert image.root == compiled.slots.first_node(number & 1)
         upload, counters = frame.report["upload"], frame.report
@@ -66,7 +66,7 @@ def test_frames_of_a_function():
     poses = [(scene.at_time(t, move=shake), camera) for t in (0.0, 1.0, 2.0)]
     frames = [frame for _, frame in render_frames(compiled, iter(poses), *size, config=config)]
     for frame, (pose, _) in zip(frames, poses, strict=True):
-        assert not frame.differs(render_model(compiled.image(pose), camera, *size, config=config)).any()
+        assert not frame.differs(render_model(compiled.image(pose, eye=camera.eye), camera, *size, config=config)).any()
     assert frames[0].differs(frames[1]).mean() > 0.05
     assert frames[0].differs(frames[2]).mean() > 0.05
 
@@ -79,7 +79,7 @@ def test_frames_of_full_shading(monkeypatch):
     config, size = replace(ChipConfig(), shader=replace(compiled.needs, depth=1)), (24, 18)
     frames = [frame for _, frame in render_frames(compiled, poses, *size, config=config, background=(9, 8, 7))]
     for number, (frame, (pose, camera)) in enumerate(zip(frames, poses, strict=True)):
-        image = compiled.image(pose, eye=camera.eye, background=(9, 8, 7))
+        image = compiled.image(pose, eye=camera.eye, is_full=True, background=(9, 8, 7))
         assert (frame.color == render_full(image, camera, *size, config=config).color).all()
         upload = frame.report["upload"]
         if number:

@@ -65,7 +65,7 @@ def glass_and_veils():
 def assert_equal(scene, *, config, size, flatten=None, camera=None, **memory):
     camera = scene.default_camera() if camera is None else camera
     image = CompiledScene(scene, fmt=config.fmt, stack_depth=config.stack_depth, flatten=flatten).image(
-        scene, eye=camera.eye, background=(20, 40, 80))
+        scene, eye=camera.eye, is_full=True, background=(20, 40, 80))
     model = render_full(image, camera, *size, config=config)
     frame = render_rtl(image, camera, *size, config=config, **memory)
     assert (frame.color == model.color).all()

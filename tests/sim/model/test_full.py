@@ -28,7 +28,7 @@ _UVS = [(-0.3, 0.2), (5.7, 0.2), (5.7, 4.2), (-0.3, 4.2)]
 
 def both(scene, camera=EYE, *, depth=4, fmt=FORMAT, size=SIZE, flatten=None, background=(20, 40, 80)):
     """The picture of the model and of golden."""
-    image = CompiledScene(scene, fmt=fmt, flatten=flatten).image(scene, eye=camera.eye, background=background)
+    image = CompiledScene(scene, fmt=fmt, flatten=flatten).image(scene, eye=camera.eye, is_full=True, background=background)
     model = render_full(image, camera, *size, config=ChipConfig(fmt=fmt), depth=depth)
     return model, render_golden(scene, camera, *size, shading="full", depth=depth, background=background)
 
@@ -175,7 +175,7 @@ def test_the_stack_holds_two_rays_a_generation(depth):
     clear = replace(VEIL, reflection=0.4, transmission=0.5, thin=True)
     scene = scene_of(textured(), *(roof(clear, z) for z in (0.5, 0.8, 1.1, 1.4)), lights=[LAMP], sky=sky())
     model, golden = both(scene, depth=depth)
-    features = replace(CompiledScene(scene, fmt=FORMAT).image(scene, eye=EYE.eye).needs, depth=depth)
+    features = replace(CompiledScene(scene, fmt=FORMAT).image(scene, eye=EYE.eye, is_full=True).needs, depth=depth)
     assert 0 < model.report["counts"]["shader_stack"] <= stack_words(features)
     assert stack_words(features) <= 4 * (2 * depth + 1) + 7
     assert np.mean(off(model, golden) > 2) <= 0.01
@@ -183,7 +183,7 @@ def test_the_stack_holds_two_rays_a_generation(depth):
 
 def test_a_shader_that_lacks_something_says_so():
     scene = SCENES["glass ball"]
-    image = CompiledScene(scene, fmt=FORMAT).image(scene, eye=EYE.eye)
+    image = CompiledScene(scene, fmt=FORMAT).image(scene, eye=EYE.eye, is_full=True)
     with pytest.raises(ValueError, match=r"lacks what the scene needs: refraction, sky$"):
         render_full(image, EYE, *SIZE, config=ChipConfig(shader=replace(image.needs, refraction=False, sky=False)))
 
@@ -191,7 +191,7 @@ def test_a_shader_that_lacks_something_says_so():
 @pytest.mark.parametrize("arithmetic", range(6))
 def test_every_arithmetic(arithmetic):
     scene = SCENES["glass ball"]
-    image = CompiledScene(scene, fmt=FORMAT).image(scene, eye=EYE.eye, background=(20, 40, 80))
+    image = CompiledScene(scene, fmt=FORMAT).image(scene, eye=EYE.eye, is_full=True, background=(20, 40, 80))
     model = render_full(image, EYE, *SIZE, config=ChipConfig(arithmetic=arithmetic))
     golden = render_golden(scene, EYE, *SIZE, shading="full", background=(20, 40, 80))
     assert psnr(model.color, golden.color) >= 45

@@ -25,7 +25,7 @@ CORNERS = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0)]
 
 
 def lanes(scene, *, fmt=FORMAT, flatten=None, **options):
-    image = CompiledScene(scene, fmt=fmt, flatten=flatten).image(scene, eye=(0.0, 0.0, 5.0), **options)
+    image = CompiledScene(scene, fmt=fmt, flatten=flatten).image(scene, eye=(0.0, 0.0, 5.0), is_full=True, **options)
     return image, *image.record_lanes()
 
 

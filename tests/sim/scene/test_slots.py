@@ -39,11 +39,11 @@ def walk():
 def test_slots_draw_what_an_image_without_slots_draws(walk, is_full):
     poses, cameras, compiled = walk
     for pose, camera in zip(poses, cameras, strict=True):
-        eye = camera.eye if is_full else None
-        plain = picture(compiled.image(pose, eye=eye), camera)
+        view = {"eye": camera.eye, "is_full": is_full}
+        plain = picture(compiled.image(pose, **view), camera)
         assert (plain.prim_id >= 0).mean() > 0.9
         for slot in (0, 1):
-            assert not picture(compiled.image(pose, eye=eye, slot=slot), camera).differs(plain).any()
+            assert not picture(compiled.image(pose, **view, slot=slot), camera).differs(plain).any()
 
 
 def changed(before, after):
@@ -66,17 +66,17 @@ def test_an_update_touches_its_own_slot(walk, is_full):
     poses, cameras, compiled = walk
     layout = compiled.slots
     assert layout.num_instances == 10
-    images = [compiled.image(poses[0], eye=cameras[0].eye if is_full else None, slot=0)]
+    images = [compiled.image(poses[0], eye=cameras[0].eye, is_full=is_full, slot=0)]
     for number, (pose, camera) in enumerate(zip(poses[1:], cameras[1:], strict=True), 1):
-        slot, eye = number & 1, camera.eye if is_full else None
-        update = compiled.update(pose, slot=slot, eye=eye)
+        slot, view = number & 1, {"eye": camera.eye, "is_full": is_full}
+        update = compiled.update(pose, slot=slot, **view)
         images.append(images[-1].updated(update))
         # Early enough for the last frame: it still draws the same with all that is written ahead.
         ahead = images[-2].updated(replace(update, between=(), root=images[-2].root, center=images[-2].center,
                                            scale=images[-2].scale))
         before = cameras[number - 1]
         assert not picture(ahead, before).differs(picture(images[-2], before)).any()
-        whole = compiled.image(pose, eye=eye, slot=slot)
+        whole = compiled.image(pose, **view, slot=slot)
         assert not picture(images[-1], camera).differs(picture(whole, camera)).any()
 
         found = changed(images[-2], images[-1])
@@ -94,7 +94,7 @@ def test_an_update_touches_its_own_slot(walk, is_full):
             assert update.bytes_between == {"records": 36}
             own = (records >= FIRST_MATRIX + 10 * slot) & (records < FIRST_MATRIX + 10 * slot + 10)
             assert (own | (records >= lights) & (records < lights + 15))[1:].all()
-            assert lights == compiled.image(poses[0], eye=eye, slot=0).record_lanes()[1][0, 9] + 15 * slot
+            assert lights == compiled.image(poses[0], **view, slot=0).record_lanes()[1][0, 9] + 15 * slot
             assert not len(found["texels"])
             assert update.bytes_ahead["records"] == 36 * (10 + 15)
         else:
@@ -105,8 +105,8 @@ def test_an_update_touches_its_own_slot(walk, is_full):
 
 def test_what_stays_is_shared(walk):
     poses, cameras, compiled = walk
-    image = compiled.image(poses[0], eye=cameras[0].eye, slot=0)
-    after = image.updated(compiled.update(poses[1], slot=1, eye=cameras[1].eye))
+    image = compiled.image(poses[0], eye=cameras[0].eye, is_full=True, slot=0)
+    after = image.updated(compiled.update(poses[1], slot=1, eye=cameras[1].eye, is_full=True))
     assert after.texels is image.texels
     assert after.triangle_prim is image.triangle_prim
     assert after.needs == image.needs
@@ -158,19 +158,35 @@ def test_a_tree_that_outgrows_its_slot_is_kept_shallower():
     assert (frame.instance_id > 1).any()
 
 
+def test_instances_are_placed_as_seen_from_the_eye():
+    scene = balls(150).at_time(1.0, move=scattered)
+    # Where the scene's middle is far and a ball is near.
+    eye = scene.instances[40].transform[:, 3] + (0.1, 0.2, 0.7)
+    image = CompiledScene(scene, fmt=FORMAT, flatten=False).image(scene, eye=eye)
+    assert (image.center == eye).all()
+    assert np.log2(image.scale) % 1 == 0
+    places = image.matrix_values()[:image.num_instances, 3] / image.scale
+    true = np.array([scene.instances[number].transform[:, 3] for number in image.instance_ids]) - eye
+    assert len(places) == 150
+    # Rounded once, seen from there; a ball's middle is computed.
+    assert (np.abs(places - true) <= 2.0 ** -17 * np.abs(true) + 1e-12).all()
+    assert np.abs(image.scale * (np.array(scene.bounds()) - eye)).max() <= 1
+
+
 def test_flat_scenes_update_lights_alone():
     mesh = quad([(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0)], Material("m", (1, 1, 1)))
     light = Light("point", position=(1, 1, 1), radius=0.5)
     scene = scene_of(mesh, lights=[light])
     compiled = CompiledScene(scene, fmt=FORMAT)
     assert compiled.is_flat
-    image = compiled.image(scene, slot=0, eye=(0, 0, 4))
+    view = {"eye": (0, 0, 4), "is_full": True}
+    image = compiled.image(scene, slot=0, **view)
     moved = replace(scene, lights=[replace(light, position=(0.2, 1, 1))])
-    update = compiled.update(moved, slot=1, eye=(0, 0, 4))
+    update = compiled.update(moved, slot=1, **view)
     assert update.bytes_ahead == update.bytes_between == {"records": 36}
     camera = scene.default_camera()
     frame = picture(image.updated(update), camera)
-    assert not frame.differs(picture(compiled.image(moved, eye=(0, 0, 4)), camera)).any()
+    assert not frame.differs(picture(compiled.image(moved, **view), camera)).any()
     assert frame.differs(picture(image, camera)).any()
     assert compiled.update(moved, slot=1).ahead == ()
 
@@ -186,7 +202,10 @@ def test_errors():
             draw(moved)
     brighter = replace(scene, lights=[Light("point"), Light("point")])
     with pytest.raises(SceneError, match=r"scene has 2 lights, but had 1 when it was compiled; compile it anew"):
-        compiled.update(brighter, slot=0, eye=(0, 0, 4))
+        compiled.update(brighter, slot=0, eye=(0, 0, 4), is_full=True)
+    for draw in (compiled.image, lambda scene, **options: compiled.update(scene, slot=0, **options)):
+        with pytest.raises(ValueError, match="^full shading needs the eye$"):
+            draw(scene, is_full=True)
 
 
 def test_moved_by_a_function():
