@@ -102,7 +102,7 @@ class Cache(wiring.Component):
         m.submodules.filled = filled = Queue(self._response_layout, depth=self._num_fetches, always_ready=True)
         m.submodules.answers = answers = Queue(self._response_layout, depth=_ANSWERS_DEPTH, always_ready=True)
         wiring.connect(m, answers.o, wiring.flipped(self.response))
-        head = waiting.o.payload
+        head, has_head = Signal(waiting_layout, reset_less=True), Signal()
 
         # Lookup: a waiting request that shall look again goes before a new one.
         requests = [Signal(self._request_layout, name=f"lookup{stage}", reset_less=stage > 0) for stage in range(3)]
@@ -165,27 +165,32 @@ class Cache(wiring.Component):
         fetches = [Signal(fetch_layout, name=f"fetch{k}") for k in range(self._num_fetches)]
         newest = Signal(range(self._num_fetches))
         oldest = Signal(range(self._num_fetches))
-        head_line = Signal(self._line_width)
-        same = Signal(self._num_fetches)
+        head_line, next_line = Signal(self._line_width), Signal(self._line_width)
+        # Of the head, and of what comes next, whose line each fetch is.
+        same, same_next = Signal(self._num_fetches), Signal(self._num_fetches)
         busy = Signal(self._num_fetches)
         on_its_way = Signal()
         free = Signal()
-        issue = Signal()
+        issue, done = Signal(), Signal()
         m.d.comb += [
             head_line.eq(head.request.index[item_bits:]),
-            same.eq(Cat(fetch.known & (fetch.line == head_line) for fetch in fetches)),
+            next_line.eq(waiting.o.payload.request.index[item_bits:]),
             busy.eq(Cat(fetch.busy for fetch in fetches)),
             on_its_way.eq((same & busy).any()),
             # A filled line that still waits for its turn keeps its place, or ``filled`` might overflow.
             free.eq(owners.level + filled.level < self._num_fetches),
-            again.eq(waiting.o.valid & same.any() & ~on_its_way & ~head.in_vain),
-            self.line_request.valid.eq(waiting.o.valid & ~on_its_way & (~same.any() | head.in_vain) & free),
+            again.eq(has_head & same.any() & ~on_its_way & ~head.in_vain),
+            self.line_request.valid.eq(has_head & ~on_its_way & (~same.any() | head.in_vain) & free),
             self.line_request.payload.eq(head_line),
             issue.eq(self.line_request.valid & self.line_request.ready),
             owners.i.payload.eq(head.request),
             owners.i.valid.eq(issue),
-            waiting.o.ready.eq(issue | again & room),
+            done.eq(issue | again & room),
+            waiting.o.ready.eq(~has_head | done),
         ]
+        # The head is compared before it gets there: from a queue through all fetches to who may send is a long way.
+        with m.If(waiting.o.ready):
+            m.d.sync += [head.eq(waiting.o.payload), has_head.eq(waiting.o.valid), same.eq(same_next)]
         line_words = self.line_words
         complete = Signal(line_bits)
         gathered = Signal(line_bits, reset_less=True)
@@ -201,7 +206,9 @@ class Cache(wiring.Component):
         for number, fetch in enumerate(fetches):
             with m.If(last & (oldest == number)):
                 m.d.sync += fetch.busy.eq(0)
+            m.d.comb += same_next[number].eq(fetch.known & (fetch.line == next_line))
             with m.If(issue & (newest == number)):
+                m.d.comb += same_next[number].eq(head_line == next_line)
                 m.d.sync += [fetch.line.eq(head_line), fetch.known.eq(1), fetch.busy.eq(1)]
             with m.If(self.flush):
                 m.d.sync += fetch.known.eq(0)

@@ -93,7 +93,7 @@ def test_answers_are_right_and_not_doubled(tmp_path, parameters, cycles):
 
 # The longest that a request waits: a cycle less is refuted.
 @pytest.mark.parametrize(("num_waiting", "patience", "cycles"), [
-    (1, 6, 13), (2, 8, 14)])
+    (1, 7, 14), (2, 9, 15)])
 def test_every_request_is_answered(tmp_path, num_waiting, patience, cycles):
     module, ports = cache_proof(num_waiting=num_waiting, patience=patience)
     prove(module, ports=ports, cycles=cycles, by_induction=False, folder=tmp_path)
