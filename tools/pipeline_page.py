@@ -9,10 +9,16 @@ def _demos(results):
     rows = results.get("demos", [])
     drawn = markdown_table(
         ["demo", "size", "cycles", "rays", "cycles a ray", "instructions a pixel", "chip ≠ model",
-         "PSNR, model and golden", "FLIP", "another first surface", "pixels > 8 levels off", "PSNR of the others"],
+         "PSNR, model and golden", "FLIP", "PSNR of golden, moved 1/256 pixel", "another first surface",
+         "pixels > 8 levels off", "of which golden shows within 1/64 pixel", "PSNR of the others"],
         [[row["demo"], "×".join(map(str, row["size"])), f"{row['cycles']:,}", f"{row['rays']:,}", row["cycles_per_ray"],
           row["instructions_per_pixel"], row["rtl_wrong_pixels"], f"{row['psnr_db']} dB", row["flip"],
-          row["other_surface_pixels"], row["far_pixels"], f"{row['psnr_near_db']} dB"] for row in rows])
+          f"{row['golden_moved_psnr_db']} dB", row["other_surface_pixels"], row["far_pixels"], row["explained_pixels"],
+          f"{row['psnr_near_db']} dB"] for row in rows])
+    formats = [point["format"] for point in rows[0]["formats"]] if rows else []
+    by_format = markdown_table(
+        ["demo: PSNR in dB, FLIP", *formats],
+        [[row["demo"], *(f"{point['psnr_db']:.1f}, {point['flip']:.4f}" for point in row["formats"])] for row in rows])
     kinds = list(rows[0]["rays_by_kind"]) if rows else []
     by_kind = markdown_table(["demo", *kinds], [[row["demo"], *(f"{row['rays_by_kind'][kind]:,}" for kind in kinds)]
                                                 for row in rows])
@@ -22,18 +28,51 @@ def _demos(results):
         ["demo", *(f"{unit}, busy" for unit in units), *(f"{cache}, hits" for cache in caches)],
         [[row["demo"], *(f"{row['busy'][unit]:.0%}" for unit in units),
           *(f"{row['hit_rate'][cache]:.1%}" if cache in row["hit_rate"] else "–" for cache in caches)] for row in rows])
-    return "\n".join((drawn, by_kind, work))
+    return "\n".join((drawn, by_format, by_kind, work))
+
+
+def _effects(results):
+    return markdown_table(
+        ["effect", "switches of its own", "instructions", "rays", "cycles", "chip ≠ model", "PSNR, model and golden",
+         "FLIP"],
+        [[row["effect"], ", ".join(row["switches"]) or "–", row["instructions"], f"{row['rays']:,}",
+          f"{row['cycles']:,}", row["rtl_wrong_pixels"], f"{row['psnr_db']} dB", row["flip"]]
+         for row in results.get("effects", [])])
 
 
 def _scaling(results):
     rows = results.get("scaling", [])
-    return markdown_table(
+    sizes = markdown_table(
         ["threads", "pipelines", "shaders each", "rays", "cycles", "cycles a ray", "chip ≠ model", "traversal, busy",
          "transformation, busy", "shader, busy"],
         [[row["threads"], row["pipelines"], row["shaders"],
-          f"{row['rays']:,}" + (", half of them shadow rays" if row["shadows"] else ", primary"), f"{row['cycles']:,}",
+          f"{row['rays']:,}, " + (f"{row['shadow_rays']:,} of them shadow rays" if row["shadows"] else "primary"),
+          f"{row['cycles']:,}",
           f"{row['cycles'] / row['rays']:.2f}", row["rtl_wrong_pixels"],
           *(f"{row['busy'][unit]:.0%}" for unit in ("traversal", "transformation", "shader"))] for row in rows])
+    return f"{sizes}\n{_kinds_of_rays(rows)}"
+
+
+def _kinds_of_rays(rows):
+    """What a primary and what a shadow ray takes, of chips with and without shadows."""
+    cycles = {(row["threads"], row["pipelines"], row["shaders"], row["shadows"]): row["cycles"] for row in rows}
+    costs = []
+    for row in rows:
+        size = row["threads"], row["pipelines"], row["shaders"]
+        if row["shadows"] and (*size, False) in cycles:
+            alone = cycles[*size, False]
+            primary, shadow = alone / (row["rays"] - row["shadow_rays"]), (row["cycles"] - alone) / row["shadow_rays"]
+            costs.append([row["shaders"], f"{primary:.2f}", f"{shadow:.2f}", f"{shadow / primary - 1:+.0%}"])
+    return markdown_table(["shaders", "cycles a primary ray, shaded, alone", "cycles more a shadow ray", ""], costs)
+
+
+def _caches(results):
+    return markdown_table(
+        ["lines of records", "lines of texels", "cycles", "records, hits", "texels, hits", "KB of records",
+         "KB of texels"],
+        [[row["shading_lines"], row["texture_lines"], f"{row['cycles']:,}", f"{row['shading_hit_rate']:.1%}",
+          f"{row['texture_hit_rate']:.1%}", *(f"{row[f'{name}_bytes'] / 1024:,.0f}" for name in ("shading", "texture"))]
+         for row in results.get("caches", [])])
 
 
 def _operators(results):
@@ -53,7 +92,7 @@ def _operators(results):
     return "\n".join((units, ratios))
 
 
-_PARTS = {"demos": _demos, "scaling": _scaling, "operators": _operators}
+_PARTS = {"effects": _effects, "demos": _demos, "scaling": _scaling, "caches": _caches, "operators": _operators}
 
 
 def filled(page, results):

@@ -17,7 +17,8 @@ def _srgb(linear):
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
-def render_golden(scene, camera, width, height, *, background=(0, 0, 0), shading="simple", depth=4):
+def render_golden(scene, camera, width, height, *, background=(0, 0, 0), shading="simple", depth=4,
+                  shift=(0.0, 0.0)):
     """What the chip is to draw.
 
     Simple shading is each surface's colour times |D·N|, at most 1, with D the camera's ray through the pixel, not
@@ -35,6 +36,8 @@ def render_golden(scene, camera, width, height, *, background=(0, 0, 0), shading
         ``simple`` or ``full``.
     depth : int
         Of full shading: generations of secondary rays.
+    shift : (float, float)
+        Right and down, in pixels: where the rays go through instead of the pixels' centres.
 
     Returns
     -------
@@ -44,11 +47,11 @@ def render_golden(scene, camera, width, height, *, background=(0, 0, 0), shading
     """
     if shading not in SHADINGS:
         raise ValueError(f"shading is '{shading}'; it must be {' or '.join(SHADINGS)}")
-    hits = render(scene, camera, width, height)
+    hits = render(scene, camera, width, height, shift=shift)
     frame = Frame.empty(width, height, background)
     frame.instance_id, frame.prim_id = hits.instance_id, hits.prim_id
     frame.t, frame.u, frame.v = hits.t, hits.u, hits.v
-    origin, directions = camera.rays(width, height)
+    origin, directions = camera.rays(width, height, shift=shift)
     if shading == "full":
         colors, levels = shade_full(scene, origin, directions, depth=depth, background=background)
         frame.color[:] = np.rint(255 * _srgb(colors))

@@ -139,6 +139,6 @@ def trace(scene, origins, directions, t_min=0.0, *, exclude=None):
     return Hits(*ids, *distances, dot).reshape(*shape)
 
 
-def render(scene, camera, width, height):
+def render(scene, camera, width, height, *, shift=(0.0, 0.0)):
     """Closest hits of a camera's rays through the centres of width × height pixels, as [height, width] arrays."""
-    return trace(scene, *camera.rays(width, height))
+    return trace(scene, *camera.rays(width, height, shift=shift))

@@ -83,13 +83,15 @@ class Camera:
         right /= np.linalg.norm(right)
         return right, np.cross(right, forward), forward
 
-    def rays(self, width, height):
+    def rays(self, width, height, *, shift=(0.0, 0.0)):
         """Rays through the pixel centres, directions not normalised (forward component 1).
 
         Parameters
         ----------
         width, height : int
             Size of the picture, in pixels.
+        shift : (float, float)
+            Right and down, in pixels: where instead of the centres they go through.
 
         Returns
         -------
@@ -99,7 +101,7 @@ class Camera:
         """
         right, up, forward = self.basis()
         half_width = math.tan(math.radians(self.hfov_deg) / 2)
-        x = (2 * (np.arange(width) + 0.5) / width - 1) * half_width
-        y = (1 - 2 * (np.arange(height) + 0.5) / height) * half_width * height / width
+        x = (2 * (np.arange(width) + 0.5 + shift[0]) / width - 1) * half_width
+        y = (1 - 2 * (np.arange(height) + 0.5 + shift[1]) / height) * half_width * height / width
         directions = x[None, :, None] * right + y[:, None, None] * up + forward
         return self.eye.copy(), directions

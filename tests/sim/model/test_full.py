@@ -28,7 +28,8 @@ _UVS = [(-0.3, 0.2), (5.7, 0.2), (5.7, 4.2), (-0.3, 4.2)]
 
 def both(scene, camera=EYE, *, depth=4, fmt=FORMAT, size=SIZE, flatten=None, background=(20, 40, 80)):
     """The picture of the model and of golden."""
-    image = CompiledScene(scene, fmt=fmt, flatten=flatten).image(scene, eye=camera.eye, is_full=True, background=background)
+    image = CompiledScene(scene, fmt=fmt, flatten=flatten).image(
+        scene, eye=camera.eye, is_full=True, background=background)
     model = render_full(image, camera, *size, config=ChipConfig(fmt=fmt), depth=depth)
     return model, render_golden(scene, camera, *size, shading="full", depth=depth, background=background)
 

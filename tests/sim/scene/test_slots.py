@@ -204,7 +204,7 @@ def test_errors():
     with pytest.raises(SceneError, match=r"scene has 2 lights, but had 1 when it was compiled; compile it anew"):
         compiled.update(brighter, slot=0, eye=(0, 0, 4), is_full=True)
     for draw in (compiled.image, lambda scene, **options: compiled.update(scene, slot=0, **options)):
-        with pytest.raises(ValueError, match="^full shading needs the eye$"):
+        with pytest.raises(ValueError, match=r"^full shading needs the eye$"):
             draw(scene, is_full=True)
 
 
