@@ -50,6 +50,8 @@ _CHECKED_PIXELS = 1 << 21
               metavar="R G B")
 @click.option("--flatten/--instances", default=None, help="Put all triangles into one space, or transform rays into "
               "each instance  [default: flatten if nothing moves and no mesh is there twice]")
+@click.option("--center", type=click.Choice(["eye", "scene"]), default="eye", show_default=True,
+              help="Where the chip's numbers are finest, of a scene of instances")
 @click.option("--chip", "parameters", type=CHIP, multiple=True, help="A parameter of the chip, see rtl/config.py")
 @click.option("--latency", type=click.IntRange(1, 1000), default=4, show_default=True,
               help="Cycles from a memory request to its first word")
@@ -64,7 +66,7 @@ _CHECKED_PIXELS = 1 << 21
 @click.option("--report", type=click.Path(dir_okay=False, path_type=Path), help="JSON to write")
 @click.option("--check/--no-check", default=True, help="Compare with the model and with golden")
 def render(scene, output, engine, size, fmt, camera, view, frames, shading, depth, sky, background, flatten,
-           parameters, latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
+           center, parameters, latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
     """Draw SCENE: an .obj, .ply, .ply.gz, .gltf or .glb file, or a built-in one: room, mirror-room, vpl, walk or
     sunflowers."""
     _check_shading(engine, shading, depth, sky, hits)
@@ -90,7 +92,8 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
         if engine != "golden":
             with progress_on(console, "building kd-trees"):
                 compiled = CompiledScene(loaded, fmt=fmt, stack_depth=order.config.stack_depth,
-                                         index_width=order.config.index_width, flatten=flatten)
+                                         index_width=order.config.index_width, flatten=flatten,
+                                         from_eye=center == "eye")
         for warning in [*loaded.warnings, *(compiled.warnings if compiled else [])]:
             console.print(f"warning: {warning}", markup=False)
         if wave:

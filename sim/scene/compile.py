@@ -52,6 +52,9 @@ class CompiledScene:
     flatten : bool or None
         Put all triangles into the scene's own space, so that no ray needs to be transformed into an instance.
         Default: if nothing moves and no mesh is there twice.
+    from_eye : bool
+        Place instances as seen from the eye where it is known, not from the scene's middle: most bits are left to
+        those nearby.
 
     Raises
     ------
@@ -59,8 +62,9 @@ class CompiledScene:
         If the scene does not fit the format or the memory.
     """
 
-    def __init__(self, scene, *, fmt, stack_depth=32, index_width=24, flatten=None):
+    def __init__(self, scene, *, fmt, stack_depth=32, index_width=24, flatten=None, from_eye=True):
         self._scene = scene
+        self._from_eye = from_eye
         self._fmt = fmt
         self._stack_depth = stack_depth
         self._index_width = index_width
@@ -140,8 +144,7 @@ class CompiledScene:
         scene : Scene
             The scene that was compiled, or it at another time.
         eye : float64[3], optional
-            Where the camera is: instances are placed as seen from there, which leaves most bits to those nearby. A
-            scene that is flat stays where it is. Full shading lights scenes without lights from there.
+            Where the camera is. Full shading lights scenes without lights from there.
         is_full : bool
             Whether with the records of full shading, which wants an ``eye``, or for simple shading.
         background : tuple of int
@@ -194,7 +197,8 @@ class CompiledScene:
             return None
         room = (self.slots.top_nodes, self.slots.top_entries) if slotted else None
         return top_level(scene, shown=self._shown, boxes=[part and part.box for part in self._parts],
-                         spaces=self._spaces, fmt=self._fmt, max_depth=self._stack_depth, eye=eye, room=room)
+                         spaces=self._spaces, fmt=self._fmt, max_depth=self._stack_depth,
+                         center=np.asarray(eye, np.float64) if self._from_eye and eye is not None else None, room=room)
 
     def _update(self, scene, top, static, slot, eye):
         layout, ahead, between = static.layout, [], []

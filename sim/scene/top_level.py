@@ -53,11 +53,11 @@ class TopLevel:
         return len(self.tree.items)
 
 
-def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, eye=None, room=None):
+def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, center=None, room=None):
     """The top level of a scene as it stands.
 
-    Instances are off by units in the last place of their distance from the center, which is the eye where it is known:
-    then all by the same angle, as the eye sees them.
+    Instances are off by units in the last place of their distance from the center; if that is the eye, all by the same
+    angle, as the eye sees them.
 
     Parameters
     ----------
@@ -71,8 +71,8 @@ def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, eye=None, room=Non
     fmt : FloatFormat
     max_depth : int
         Bound of the tree's depth.
-    eye : float64[3], optional
-        Where the camera is.
+    center : float64[3], optional
+        Origin of the chip's scene coordinates, by default the scene's middle.
     room : (int, int), optional
         Nodes and list entries that the tree must not exceed, at least 2 and the number of instances: where it would, it
         is kept shallower, at the cost of rays that visit more instances than they need to.
@@ -86,7 +86,7 @@ def top_level(scene, *, shown, boxes, spaces, fmt, max_depth, eye=None, room=Non
     SceneError
         If an instance's transform does not fit the format.
     """
-    center, scale = unit_box(*scene.bounds(), center=None if eye is None else np.array(eye, np.float64))
+    center, scale = unit_box(*scene.bounds(), center=center)
     placed = [scene.instances[number] for number in shown]
     meshes = [instance.mesh for instance in placed]
     transforms = np.array([instance.transform for instance in placed])

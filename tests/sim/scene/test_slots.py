@@ -171,6 +171,8 @@ def test_instances_are_placed_as_seen_from_the_eye():
     # Rounded once, seen from there; a ball's middle is computed.
     assert (np.abs(places - true) <= 2.0 ** -17 * np.abs(true) + 1e-12).all()
     assert np.abs(image.scale * (np.array(scene.bounds()) - eye)).max() <= 1
+    middle = CompiledScene(scene, fmt=FORMAT, flatten=False, from_eye=False).image(scene, eye=eye).center
+    assert np.allclose(middle, np.mean(scene.bounds(), axis=0))
 
 
 def test_flat_scenes_update_lights_alone():
