@@ -16,7 +16,7 @@ from sim.scene.compile import CompiledScene
 from .errors import written_whole
 from .sensitivity import MovedPictures, flip
 
-__all__ = ["DEPTH", "FORMAT", "JITTER", "LATENCY", "demo_rows", "prepared"]
+__all__ = ["DEPTH", "FORMAT", "JITTER", "LATENCY", "NUDGE", "demo_rows", "prepared"]
 
 FORMAT = FloatFormat(7, 16)
 #: Formats that the model draws each demo in.
@@ -31,8 +31,10 @@ DEMO_CHIP = ChipConfig(fmt=FORMAT, num_shaders=2)
 LATENCY, JITTER = 4, 8
 #: Levels by which a pixel may differ before it is counted.
 _FAR = 8
-#: Parts of a pixel by which golden's samples are moved: to compare with, and to explain pixels by.
-_NUDGE, _REACH = 1 / 256, 1 / 64
+#: Part of a pixel by which golden's samples are moved, to compare with.
+NUDGE = 1 / 256
+#: Part of a pixel within which golden may show what is far off.
+_REACH = 1 / 64
 
 
 def prepared(scene, camera, *, fmt=FORMAT):
@@ -74,7 +76,7 @@ def _demo(name, size, view, pictures, console):
         "instructions_per_pixel": round(model.report["counts"]["instructions"] / (size[0] * size[1]), 1),
         "rtl_wrong_pixels": int((drawn.color != model.color).any(axis=-1).sum()),
         "psnr_db": round(psnr(model.color, golden.color), 2), "flip": round(flip(golden.color, model.color), 4),
-        "golden_moved_psnr_db": round(moved.psnr(golden.color, _NUDGE), 2),
+        "golden_moved_psnr_db": round(moved.psnr(golden.color, NUDGE), 2),
         "other_surface_pixels": int(model.differs_in_surface(golden).sum()), "far_pixels": int(far.sum()),
         "explained_pixels": int((far & moved.explains(model.color, _REACH, levels=_FAR)).sum()),
         "psnr_near_db": round(psnr(model.color[~far], golden.color[~far]), 2),

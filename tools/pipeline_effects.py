@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from dataclasses import fields, replace
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from rtl.config import ChipConfig
 from sim.golden import psnr, render_golden
@@ -14,8 +13,8 @@ from sim.model import render_full
 from sim.scene.effects import effect_scenes
 
 from .errors import written_whole
-from .pipeline_demos import DEPTH, FORMAT, prepared
-from .sensitivity import flip
+from .pipeline_demos import DEPTH, FORMAT, NUDGE, prepared
+from .sensitivity import MovedPictures, flip
 
 __all__ = ["effect_rows"]
 
@@ -63,16 +62,23 @@ def effect_rows(path, console):
                      "rays": sum(number for kind, number in kinds.items() if kind != "hole"),
                      "rtl_wrong_pixels": int((drawn.color != model.color).any(axis=-1).sum()),
                      "psnr_db": round(psnr(model.color, golden.color), 2),
+                     "golden_moved_psnr_db": round(
+                         MovedPictures(scene, camera, _SIZE, depth=DEPTH).psnr(golden.color, NUDGE), 2),
                      "flip": round(flip(golden.color, model.color), 4)})
         console.print(f"{name}: {drawn.report['cycles']:,} cycles", highlight=False)
     with written_whole(path) as target:
-        _sheet(pairs).savefig(target, format="png", dpi=100)
+        _sheet(pairs).savefig(target, format="png", dpi=100, metadata={"Software": None})
     return rows
 
 
 def _sheet(pairs):
+    # Here, because no other command needs it and it takes a while.
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     num_rows = -(-len(pairs) // _COLUMNS)
     figure = Figure(figsize=(2.2 * _COLUMNS, 3.6 * num_rows), layout="constrained")
+    FigureCanvasAgg(figure)
     for place, axes in zip(pairs, figure.subplots(num_rows, _COLUMNS).flat, strict=False):
         axes.imshow(np.concatenate(pairs[place]), interpolation="nearest")
         axes.set_title(place, fontsize=9)

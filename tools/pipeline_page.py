@@ -34,9 +34,10 @@ def _demos(results):
 def _effects(results):
     return markdown_table(
         ["effect", "switches of its own", "instructions", "rays", "cycles", "chip ≠ model", "PSNR, model and golden",
-         "FLIP"],
+         "PSNR of golden, moved 1/256 pixel", "FLIP"],
         [[row["effect"], ", ".join(row["switches"]) or "–", row["instructions"], f"{row['rays']:,}",
-          f"{row['cycles']:,}", row["rtl_wrong_pixels"], f"{row['psnr_db']} dB", row["flip"]]
+          f"{row['cycles']:,}", row["rtl_wrong_pixels"], f"{row['psnr_db']} dB",
+          f"{row['golden_moved_psnr_db']} dB", row["flip"]]
          for row in results.get("effects", [])])
 
 
@@ -71,7 +72,8 @@ def _caches(results):
         ["lines of records", "lines of texels", "cycles", "records, hits", "texels, hits", "KB of records",
          "KB of texels"],
         [[row["shading_lines"], row["texture_lines"], f"{row['cycles']:,}", f"{row['shading_hit_rate']:.1%}",
-          f"{row['texture_hit_rate']:.1%}", *(f"{row[f'{name}_bytes'] / 1024:,.0f}" for name in ("shading", "texture"))]
+          f"{row['textures_hit_rate']:.1%}",
+          *(f"{row[f'{name}_bytes'] / 1024:,.0f}" for name in ("shading", "textures"))]
          for row in results.get("caches", [])])
 
 
