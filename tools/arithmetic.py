@@ -19,12 +19,11 @@ from rtl.transformation import affine_map
 from rtl.traversal import kd_step
 from sim.golden import psnr, render_golden
 from sim.model import render_model
-from sim.scene import Camera, load_scene
 from sim.scene.compile import CompiledScene
 
 from .errors import clear_errors, written_whole
-from .first_light import SCENES
 from .page import check_places, filled_page, markdown_table
+from .real_scenes import real_scenes
 
 __all__ = ["arithmetic"]
 
@@ -39,13 +38,8 @@ DATAPATHS = {"transformation": (affine_map, ("separate", "fused", "fused-narrow"
 
 def _pictures(scenes, console):
     """Rows of scene and arithmetic: how far the model's picture is from golden, and what it takes to draw."""
-    cameras = json.loads((scenes / "cameras.json").read_text())
     rows, pixels = [], SIZE[0] * SIZE[1]
-    for name, file, view in SCENES:
-        scene = load_scene("room" if file is None else scenes / file)
-        numbers = cameras[view][0] if view else None
-        camera = (Camera(numbers["eye"], numbers["at"], numbers["up"], numbers["hfov_deg"]) if view else
-                  scene.default_camera())
+    for name, scene, camera in real_scenes(scenes):
         golden = render_golden(scene, camera, *SIZE)
         image = CompiledScene(scene, fmt=FORMAT).image(scene, eye=camera.eye)
         for number, arithmetic in enumerate(ARITHMETICS):

@@ -3,6 +3,7 @@
 import click
 
 from .arithmetic import arithmetic
+from .chart import chart
 from .first_light import first_light
 from .fpu_report import fpu_report
 from .inspect import image
@@ -19,6 +20,7 @@ def main():
 
 
 main.add_command(arithmetic)
+main.add_command(chart)
 main.add_command(first_light)
 main.add_command(fpu_report)
 main.add_command(pipeline)

@@ -18,11 +18,11 @@ from rtl.config import ChipConfig
 from sim.golden import psnr, render_golden
 from sim.machine import render_rtl
 from sim.model import render_model
-from sim.scene import Camera, load_scene
 from sim.scene.compile import CompiledScene
 
 from .errors import BadInput, clear_errors, written_whole
 from .first_light_page import page
+from .real_scenes import SCENES, real_scenes
 
 __all__ = ["first_light"]
 
@@ -31,16 +31,6 @@ CHECK_SIZE = 64, 48
 THREADS = 1, 7, 32, 64
 SEEDS = 1, 2, 3
 JITTER = 40
-
-#: Scene, file below --scenes, its view in cameras.json.
-SCENES = (
-    ("room", None, None),
-    ("simple_room", "scene6_simple_room/simple_room.obj", "scene6"),
-    ("bunny", "classic/stanford-bunny.obj", "bunny"),
-    ("conference", "conference/conference.obj", "conference"),
-    ("grande_salle", "office_laas_grande_salle/grande_salle.obj", "office"),
-    ("terrain", "terrain.glb", "terrain"),
-)
 
 #: The paper's Table 3 and 4: cycles a ray (90 MHz ÷ frames a second ÷ 512·384), busy % of traversal, list,
 #: transformation and intersection, hit % of nodes, lists and matrices; frames a second at 1024×768, and there MB/s of
@@ -177,18 +167,9 @@ def first_light(scenes, docs, only, check, clone):
     for folder in (path.parent, pictures):
         folder.mkdir(exist_ok=True)
     results = json.loads(path.read_text()) if path.exists() else {"rows": []}
-    cameras = json.loads((scenes / "cameras.json").read_text())
     rows = {row["scene"]: row for row in results["rows"]}
     with clear_errors():
-        for name, file, view in SCENES:
-            if clone or (only and name not in only):
-                continue
-            scene = load_scene("room" if file is None else scenes / file)
-            if view is None:
-                camera = scene.default_camera()
-            else:
-                numbers = cameras[view][0]
-                camera = Camera(numbers["eye"], numbers["at"], numbers["up"], numbers["hfov_deg"])
+        for name, scene, camera in [] if clone else real_scenes(scenes, only=only):
             checks = rows.get(name, {}).get("checks", [])
             rows[name] = _measure(name, scene, camera, pictures, console)
             rows[name]["checks"] = _check(name, scene, camera, console) if check else checks

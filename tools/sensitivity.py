@@ -6,9 +6,10 @@ import numpy as np
 
 from sim.golden import psnr, render_golden
 
-__all__ = ["MovedPictures", "flip"]
+__all__ = ["AROUND", "MovedPictures", "flip"]
 
-_AROUND = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * (math.pi / 4)]
+#: Eight directions.
+AROUND = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * (math.pi / 4)]
 
 
 def flip(reference, picture):
@@ -41,7 +42,7 @@ class MovedPictures:
     def at(self, pixels):
         """uint8[8, height, width, 3]: the pictures of samples moved by so many pixels."""
         return np.stack([render_golden(self._scene, self._camera, *self._size, shading="full", depth=self._depth,
-                                       shift=(x * pixels, y * pixels)).color for x, y in _AROUND])
+                                       shift=(x * pixels, y * pixels)).color for x, y in AROUND])
 
     def psnr(self, golden, pixels):
         """PSNR in dB of all eight together against ``golden``, whose samples are where they belong."""

@@ -88,6 +88,9 @@ class CompiledScene:
                 self._parts.append(self._mesh_part(scene, mesh, common))
             self._shown = [number for number, placed in enumerate(scene.instances)
                            if self._parts[placed.mesh] is not None]
+        if not any(self._parts):
+            raise SceneError(f"nothing is left of the scene: no triangle has an area once its vertices are rounded to "
+                             f"format {fmt}; choose a format with more bits")
 
     def _flat_part(self, scene, common):
         corners, instance, prim, material = [], [], [], []
@@ -103,6 +106,8 @@ class CompiledScene:
         part = make_part("scene" if len(scene.instances) > 1 else scene.instances[0].name,
                           np.concatenate(corners), np.concatenate(instance), np.concatenate(prim),
                           np.concatenate(material), 1 / self.scale, **common)
+        if part is None:
+            return None
         # The front of a triangle is where it is in its mesh's space.
         mirrored = np.array([np.linalg.det(placed.transform[:, :3]) < 0 for placed in scene.instances])
         part.rows[mirrored[part.instance], 2] *= -1

@@ -91,6 +91,11 @@ def make_part(name, corners, instance, prim, material, normal_scale, *, fmt, sta
     warnings : list of str
         Receives what was dropped.
 
+    Returns
+    -------
+    Part or None
+        None if no triangle is left.
+
     Raises
     ------
     SceneError
@@ -103,6 +108,8 @@ def make_part(name, corners, instance, prim, material, normal_scale, *, fmt, sta
                         f"vertices are rounded to format {fmt}")
     corners, instance, prim, material, rows, centers = (
         array[usable] for array in (corners, instance, prim, material, rows, centers))
+    if not len(corners):
+        return None
     overflow = ~np.isfinite(fmt.quantize(rows)).all(axis=(1, 2))
     if overflow.any():
         worst = np.flatnonzero(overflow)[0]

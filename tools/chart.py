@@ -1,0 +1,94 @@
+"""``dynrt chart``: what fewer bits and cheaper arithmetic do to pictures."""
+
+import csv
+import hashlib
+import json
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from fpu import FloatFormat
+from rtl.arithmetic import ARITHMETICS
+
+from .chart_page import draw_charts, filled
+from .chart_truth import Truth
+from .errors import clear_errors, written_whole
+from .real_scenes import SCENES, real_scenes
+
+__all__ = ["chart"]
+
+SIZE = 384, 288
+FORMATS = ("5.8", "5.10", "6.10", "6.12", "6.14", "7.12", "7.14", "7.16", "7.18", "7.20", "7.23", "8.23")
+#: Those that differ in their pictures.
+VARIANTS = ("separate", "fused", "truncated", "reciprocal")
+_SCENES = (*SCENES, ("sunflowers", None, None))
+_ROOT = Path(__file__).parents[1]
+
+
+def _version():
+    """Of all that a picture depends on: rows of another are measured anew."""
+    code = hashlib.sha256()
+    for folder in ("fpu", "rtl", "sim", "tools"):
+        for path in sorted((_ROOT / folder).rglob("*.py")):
+            if folder != "tools" or path.stem.startswith("chart"):
+                code.update(path.read_bytes())
+    return code.hexdigest()[:16]
+
+
+@click.command()
+@click.option("--scenes", type=click.Path(exists=True, file_okay=False, path_type=Path), required=True,
+              help="Folder with the scenes and cameras.json")
+@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
+              show_default=True, help="Where accuracy.md is, and results/accuracy.json, .csv and pictures/ go")
+@click.option("--only", multiple=True, type=click.Choice([name for name, _, _ in _SCENES]),
+              help="Only this scene; the others keep their figures")
+@click.option("--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Only this format  [default: all]")
+def chart(scenes, docs, only, formats):
+    """Draw scenes by the model in each format and arithmetic, and chart how far they are from float64.
+
+    What has been measured with the same code is not measured again, so a run that was stopped goes on.
+    """
+    console = Console(stderr=True, highlight=False)
+    page, path, version = docs / "accuracy.md", docs / "results" / "accuracy.json", _version()
+    numbers = {arithmetic.name: number for number, arithmetic in enumerate(ARITHMETICS)}
+    with clear_errors():
+        # Before the long work
+        filled(page, [])
+        rows = json.loads(path.read_text())["rows"] if path.exists() else []
+        known = {(row["scene"], row["format"], row["variant"]): row for row in rows}
+        for name, scene, camera in real_scenes(scenes, only=only, scenes=_SCENES):
+            truth = None
+            for fmt in formats or FORMATS:
+                missing = [variant for variant in VARIANTS
+                           if known.get((name, fmt, variant), {}).get("version") != version]
+                if not missing:
+                    continue
+                truth = truth or Truth(scene, camera, SIZE)
+                measured = truth.measure(FloatFormat.parse(fmt), {variant: numbers[variant] for variant in missing})
+                for variant, figures in measured.items():
+                    known[name, fmt, variant] = {"scene": name, "format": fmt, "variant": variant, **figures,
+                                                 "version": version}
+                rows = [known[place] for place in ((scene, one, variant) for scene, _, _ in _SCENES
+                                                   for one in FORMATS for variant in VARIANTS) if place in known]
+                _write(path, rows)
+                console.print(f"{name}, {fmt}: " + ", ".join(
+                    f"{variant} {figures['wrong_percent']} %" if "wrong_percent" in figures else figures["error"]
+                    for variant, figures in measured.items()), soft_wrap=True, markup=False)
+        _write(path, rows)
+        draw_charts(rows, docs / "pictures")
+        text = filled(page, rows)
+        with written_whole(page) as whole:
+            whole.write_text(text)
+
+
+def _write(path, rows):
+    for folder in (path.parent, path.parent.parent / "pictures"):
+        folder.mkdir(exist_ok=True)
+    with written_whole(path) as whole:
+        whole.write_text(json.dumps({"size": list(SIZE), "rows": rows}, indent=1) + "\n")
+    columns = list(dict.fromkeys(column for row in rows for column in row if column != "version"))
+    with written_whole(path.with_suffix(".csv")) as whole, open(whole, "w", newline="") as file:
+        table = csv.DictWriter(file, columns, extrasaction="ignore")
+        table.writeheader()
+        table.writerows(rows)
