@@ -9,6 +9,7 @@ from rich.console import Console
 from .costs import cost_tables, measured_luts
 from .errors import BadInput, clear_errors, written_whole
 from .pipeline_area import measure_area, measure_clock
+from .pipeline_chips import CHIPS, CLOCKED
 from .pipeline_demos import DEPTH, FORMAT, JITTER, LATENCY, demo_rows
 from .pipeline_effects import effect_rows
 from .pipeline_page import filled
@@ -23,11 +24,13 @@ __all__ = ["pipeline"]
 @click.option("--only", multiple=True,
               type=click.Choice(["effects", "demos", "scaling", "caches", "operators", "area", "clock"]),
               help="Measure these parts, keep the others  [default: all]")
+@click.option("--chip", "chips", type=click.Choice(list(CHIPS)), multiple=True, metavar="NAME",
+              help="Measure area and clock of this chip of docs/pipeline.md; the others keep their figures")
 @click.option("--jobs", type=click.IntRange(1), default=2, show_default=True,
               help="Runs of synthesis, or of place and route, at a time: 1 to 3 GB each")
 @click.option("--seeds", type=click.IntRange(1), default=1, show_default=True,
               help="Placements of each chip whose clock is measured")
-def pipeline(docs, only, jobs, seeds):
+def pipeline(docs, only, chips, jobs, seeds):
     """Draw the demos of full shading on the simulated chip, scale it, and fill the tables of docs/pipeline.md.
 
     Whole chips are synthesised for their area, two minutes each, and some placed and routed for their clock, half an
@@ -42,8 +45,10 @@ def pipeline(docs, only, jobs, seeds):
         "demos": lambda: demo_rows(pictures, console),
         "scaling": lambda: scaling_rows(console),
         "caches": lambda: cache_rows(console),
-        "area": lambda: measure_area(jobs=jobs, console=console),
-        "clock": lambda: measure_clock(seeds=range(1, seeds + 1), jobs=jobs, console=console),
+        "area": lambda: measure_area(names=chips or list(CHIPS), earlier=results.get("area", {}), jobs=jobs,
+                                     console=console),
+        "clock": lambda: measure_clock(names=chips or CLOCKED, earlier=results.get("clock", []),
+                                       seeds=range(1, seeds + 1), jobs=jobs, console=console),
     }
     with clear_errors():
         # Before the long work

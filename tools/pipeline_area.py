@@ -10,7 +10,7 @@ from boards.ecp5 import critical_path, is_placed, place
 from boards.packing import Area, is_packed, pack, pack_by_module
 from rtl.dynrtc import DynRTC
 
-from .pipeline_chips import CHIPS, CLOCKED, DETAILED
+from .pipeline_chips import CHIPS, DETAILED
 
 __all__ = ["measure_area", "measure_clock"]
 
@@ -47,11 +47,15 @@ def _all(measure, subjects, *, jobs, console):
             raise
 
 
-def measure_area(*, jobs, console):
+def measure_area(*, names, earlier, jobs, console):
     """Rows of chips, and of the units of some of them.
 
     Parameters
     ----------
+    names : list of str
+        Which of the chips.
+    earlier : dict
+        What was returned before, for the others.
     jobs : int
         Runs of synthesis at a time.
     console : rich.console.Console
@@ -74,14 +78,23 @@ def measure_area(*, jobs, console):
         known = is_packed(design)
         return (asdict(pack(design)), _units(name, pack_by_module(design)) if name in DETAILED else []), known
 
-    found = _all(measure, [(name,) for name in CHIPS], jobs=jobs, console=console)
+    found = _all(measure, [(name,) for name in names], jobs=jobs, console=console)
     chips = []
-    for chip, (area, _) in zip(CHIPS.values(), found, strict=True):
+    for name, (area, _) in zip(names, found, strict=True):
+        chip = CHIPS[name]
         program = chip.config.program
-        chips.append({"chip": chip.name, "beside": chip.beside, **area,
+        chips.append({"chip": name, "beside": chip.beside, **area,
                       "instructions": 0 if program is None else len(program.instructions)})
-    return {"device": {name: getattr(DEVICE, name) for name in ("name", "lut", "dsp", "ebr")}, "chips": chips,
-            "units": [row for _, units in found for row in units]}
+    return {"device": {name: getattr(DEVICE, name) for name in ("name", "lut", "dsp", "ebr")},
+            "chips": _merged(earlier.get("chips", []), chips, names),
+            "units": _merged(earlier.get("units", []), [row for _, units in found for row in units], names)}
+
+
+def _merged(earlier, rows, names):
+    """Earlier rows of chips that were not measured now, and the new ones, in the order of the chips."""
+    order = list(CHIPS)
+    kept = [row for row in earlier if row["chip"] in order and row["chip"] not in names]
+    return sorted([*kept, *rows], key=lambda row: order.index(row["chip"]))
 
 
 def _units(chip, areas):
@@ -95,11 +108,15 @@ def _units(chip, areas):
     return sorted(rows, key=lambda row: -row["lut"])
 
 
-def measure_clock(*, seeds, jobs, console):
+def measure_clock(*, names, earlier, seeds, jobs, console):
     """Rows of chips placed and routed: the clock by each grade and seed, and the slowest path.
 
     Parameters
     ----------
+    names : list of str
+        Which of the chips.
+    earlier : list
+        What was returned before, for the others.
     seeds : list of int
         Of the placer.
     jobs : int
@@ -112,7 +129,7 @@ def measure_clock(*, seeds, jobs, console):
     ToolError
         If a tool is missing or fails.
     """
-    designs = {name: _design(name) for name in CLOCKED}
+    designs = {name: _design(name) for name in names}
 
     def measure(subject):
         name, grade, seed = subject
@@ -123,6 +140,6 @@ def measure_clock(*, seeds, jobs, console):
         row = {"chip": name, **run, "fmax_mhz": round(clock, 1), "critical_path": path.words, "through": path.through}
         return row, known
 
-    subjects = [(name, grade, seed) for seed in seeds for name in CLOCKED for grade in GRADES]
+    subjects = [(name, grade, seed) for seed in seeds for name in names for grade in GRADES]
     rows = _all(measure, subjects, jobs=jobs, console=console)
-    return sorted(rows, key=lambda row: (CLOCKED.index(row["chip"]), row["grade"], row["seed"]))
+    return _merged(earlier, sorted(rows, key=lambda row: (row["grade"], row["seed"])), names)

@@ -14,6 +14,9 @@ from boards.packing import pack
 from rtl.config import ChipConfig
 from rtl.dynrtc import DynRTC
 
+# Of a chip only the members are looked at.
+pytestmark = pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
+
 
 class Observed(wiring.Component):
     """Sums what comes by a stream; counts how often, and asserts of a register that nothing else needs."""
@@ -58,7 +61,6 @@ def test_observing_costs_nothing():
     assert pack(whole).ff > pack(design).ff + 32
 
 
-@pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
 def test_members_of_a_chip():
     chip = DynRTC(ChipConfig(num_threads=2))
     members = {*chip.signature.members}

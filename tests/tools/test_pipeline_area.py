@@ -29,8 +29,9 @@ def docs(tmp_path, monkeypatch):
     monkeypatch.setenv("DYNRT_CACHE", str(tmp_path / "cache"))
     chips = {"simple": Chip(name="simple", config=ChipConfig()),
              "everything": Chip(name="everything", beside="simple", config=CHIPS["everything"].config)}
-    monkeypatch.setattr(pipeline_area, "CHIPS", chips)
-    monkeypatch.setattr(pipeline_area, "CLOCKED", ("everything",))
+    for module in ("pipeline", "pipeline_area"):
+        monkeypatch.setattr(f"tools.{module}.CHIPS", chips)
+    monkeypatch.setattr("tools.pipeline.CLOCKED", ("everything",))
     monkeypatch.setattr(pipeline_area, "_design", lambda name: design_of(COMPONENTS[name](TINY), name=name))
     folder = tmp_path / "docs"
     folder.mkdir()
@@ -107,6 +108,28 @@ def test_missing_marker(docs, name):
     assert result.exit_code == 2
     assert (f"pipeline.md: must have the lines '<!-- begin: {name} -->' and '<!-- end: {name} -->' once, for the table "
             "between them") in result.text
+
+
+def test_other_chips_keep_their_figures(docs):
+    assert run(docs, "--only", "area", "--chip", "simple").exit_code == 0
+    path = docs / "results" / "pipeline.json"
+    results = json.loads(path.read_text())
+    assert [row["chip"] for row in results["area"]["chips"]] == ["simple"]
+    results["area"]["chips"][0]["lut"] = 5
+    # Of a chip that is no longer there
+    results["area"]["chips"].append(results["area"]["chips"][0] | {"chip": "vanished"})
+    path.write_text(json.dumps(results))
+    assert run(docs, "--only", "area", "--chip", "everything").exit_code == 0
+    results = json.loads(path.read_text())["area"]
+    assert [row["chip"] for row in results["chips"]] == ["simple", "everything"]
+    assert results["chips"][0]["lut"] == 5 < results["chips"][1]["lut"]
+    assert [row["chip"] for row in results["units"]] == ["simple", "everything"]
+
+
+def test_unknown_chip(docs):
+    result = run(docs, "--only", "area", "--chip", "complicated")
+    assert result.exit_code == 2
+    assert "Invalid value for '--chip': 'complicated' is not one of 'simple', 'least shader', " in result.text
 
 
 def test_units_are_the_pipelines():
