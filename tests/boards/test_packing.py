@@ -117,6 +117,7 @@ def test_the_device_changes_nothing_but_where_it_is_placed(monkeypatch):
     assert not ecp5.is_placed(large, grade=6, seed=1)
     assert ecp5.place(large, grade=6, seed=1).lut == first.lut
     assert [line[0] for line in lines] == ["--25k", "--85k"]
+    assert ["router2" in line for line in lines] == [False, True]
 
 
 def test_what_is_packed_is_not_packed_again(monkeypatch):
