@@ -73,8 +73,8 @@ def fpu_report(docs, table, only, seeds, jobs, peer):
 
 
 def _flow(seeds):
-    return {"device": ecp5.DEVICE, "package": ecp5.PACKAGE, "tools": versions(), "synthesis": ecp5.SYNTHESIS,
-            "synthesis_retimed": ecp5.RETIMING, "place_and_route": " ".join(ecp5.ROUTE),
+    return {"device": ecp5.DEVICE.name, "package": ecp5.DEVICE.package, "tools": versions(),
+            "synthesis": ecp5.SYNTHESIS, "synthesis_retimed": ecp5.RETIMING, "place_and_route": " ".join(ecp5.ROUTE),
             "target_mhz": ecp5.TARGET_MHZ, "seeds": list(range(1, seeds + 1))}
 
 

