@@ -19,7 +19,7 @@ from .real_scenes import SCENES, real_scenes
 __all__ = ["chart"]
 
 SIZE = 384, 288
-FORMATS = ("5.8", "5.10", "6.10", "6.12", "6.14", "7.12", "7.14", "7.16", "7.18", "7.20", "7.23", "8.23")
+FORMATS = ("5.8", "5.10", "6.10", "6.12", "7.12", "6.14", "7.14", "7.16", "7.18", "7.20", "7.23", "8.23")
 #: Those that differ in their pictures.
 VARIANTS = ("separate", "fused", "truncated", "reciprocal")
 _SCENES = (*SCENES, ("sunflowers", None, None))
