@@ -45,12 +45,13 @@ def _scaling(results):
     rows = results.get("scaling", [])
     sizes = markdown_table(
         ["threads", "pipelines", "shaders each", "rays", "cycles", "cycles a ray", "chip ≠ model", "traversal, busy",
-         "transformation, busy", "shader, busy"],
+         "transformation, busy", "shader, busy", "busiest memory port"],
         [[row["threads"], row["pipelines"], row["shaders"],
           f"{row['rays']:,}, " + (f"{row['shadow_rays']:,} of them shadow rays" if row["shadows"] else "primary"),
           f"{row['cycles']:,}",
           f"{row['cycles'] / row['rays']:.2f}", row["rtl_wrong_pixels"],
-          *(f"{row['busy'][unit]:.0%}" for unit in ("traversal", "transformation", "shader"))] for row in rows])
+          *(f"{row['busy'][unit]:.0%}" for unit in ("traversal", "transformation", "shader")),
+          "{}: {:.0%}".format(*max(row["port_busy"].items(), key=lambda port: port[1]))] for row in rows])
     return f"{sizes}\n{_kinds_of_rays(rows)}"
 
 

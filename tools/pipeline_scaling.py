@@ -41,7 +41,9 @@ def scaling_rows(console):
         rows.append({"threads": threads, "pipelines": pipelines, "shaders": shaders, "shadows": shadows,
                      "cycles": drawn.report["cycles"], "rays": sum(kinds.values()), "shadow_rays": kinds["shadow"],
                      "rtl_wrong_pixels": int((drawn.color != model.color).any(axis=-1).sum()),
-                     "busy": {unit: round(part, 3) for unit, part in drawn.report["busy"].items()}})
+                     "busy": {unit: round(part, 3) for unit, part in drawn.report["busy"].items()},
+                     "port_busy": {memory: round(count / 4 / drawn.report["cycles"], 3)
+                                   for memory, count in drawn.report["bytes"].items()}})
         console.print(f"{threads} threads, {pipelines} pipelines, {shaders} shaders"
                       f"{'' if shadows else ', primary rays alone'}: {drawn.report['cycles']:,} cycles",
                       highlight=False)

@@ -52,7 +52,8 @@ def test_a_page_without_a_place(docs):
 def scaled(*, shaders, shadows, cycles):
     return {"threads": 64, "pipelines": 1, "shaders": shaders, "shadows": shadows, "cycles": cycles,
             "rays": 1500 if shadows else 1000, "shadow_rays": 500 if shadows else 0, "rtl_wrong_pixels": 0,
-            "busy": {"traversal": 0.5, "transformation": 0.25, "shader": 1.0}}
+            "busy": {"traversal": 0.5, "transformation": 0.25, "shader": 1.0},
+            "port_busy": {"nodes": 0.1, "matrices": 0.2}}
 
 
 def test_what_a_shadow_ray_costs():
@@ -61,4 +62,5 @@ def test_what_a_shadow_ray_costs():
     text = filled(DOCS / "pipeline.md", {"scaling": rows})
     # 20 cycles a ray without shadows, 12,000 more for 500 shadow rays.
     assert "| 1 | 20.00 | 24.00 | +20% |" in text
-    assert "| 64 | 1 | 1 | 1,500, 500 of them shadow rays | 32,000 | 21.33 | 0 | 50% | 25% | 100% |" in text
+    assert ("| 64 | 1 | 1 | 1,500, 500 of them shadow rays | 32,000 | 21.33 | 0 | 50% | 25% | 100% | matrices: 20% |"
+            in text)
