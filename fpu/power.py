@@ -65,7 +65,7 @@ def _at_most_one_plus(a, power):
     fmt = a.shape()
     # A carry-free comparison of frac·2^−frac_width with the power: all places from the power's up must be 0.
     frac_width, bias = fmt.frac_width, fmt.bias
-    over = Cat(a.frac[place] & (power.exp <= bias - frac_width + place) for place in range(frac_width)).any()
+    over = Cat(a.frac[place] & (power.exp <= max(bias - frac_width + place, 0)) for place in range(frac_width)).any()
     return a.sign | (a.exp < bias) | (a.exp == bias) & (~over | ~a.frac.any())
 
 

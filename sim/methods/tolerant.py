@@ -8,10 +8,14 @@ from .method import Method
 from .parts import outputs
 from .unit_triangle import stored_matrix
 
-__all__ = ["TOLERANCES", "scaled_map", "tolerant", "tolerant_test"]
+__all__ = ["BOUNDS", "CAP", "TOLERANCES", "scaled_map", "tolerant", "tolerant_test"]
 
 #: k of the methods.
 TOLERANCES = (2, 4, 8, 16)
+#: What bounds the error of u, see :func:`tolerant_test`.
+BOUNDS = ("lean", "full", "products", "terms")
+#: No edge is wider, in u and v.
+CAP = 2.0**-6
 
 
 def scaled_map(fmt, *, latencies=None):
@@ -30,52 +34,72 @@ def scaled_map(fmt, *, latencies=None):
     return dp
 
 
-def tolerant_test(fmt, *, ulp, variant="conditioned", cap=None, lcap=None, latencies=None):
-    """The chip's test, with u ≥ −ε, v ≥ −ε and u + v ≤ 1 + ε, where ε is k units in the last place.
+def tolerant_test(fmt, *, ulp, bound=BOUNDS[0], cap=CAP, latencies=None):
+    """The chip's test with u > −ε_u, v > −ε_v and u + v < 1 + max(ε_u, ε_v).
 
     ::
 
-        t = −O′z / D′z,  u = O′x + t·D′x,  v = O′y + t·D′y
+        t = −O′z / D′z,   u = O′x + w,  w = t·D′x,   ε_u = min(ulp·2^−frac_width·E, cap)
+
+    where E, of powers of two alone, is by ``bound``
+
+    ==========  =====================================================================================================
+    lean        max(s(O′x), |w|·s(D′z)/|D′z|): s is the largest of the products that were added up, so s(a)/|a| is
+                what a has lost to cancellation. D′z = D·N loses where the ray grazes, and t with it, and O′z alike
+    full        max(s(O′x), t·s(D′x), |w|·max(s(O′z)/|O′z|, s(D′z)/|D′z|))
+    products    max(s(O′x), t·s(D′x))
+    terms       max(|O′x|, |w|)
+    ==========  =====================================================================================================
+
+    The ``cap`` keeps triangles from reaching out that are seen so exactly from their edge that nothing is left of t.
+    What is 0 or more, and u + v ≤ 1, is inside whatever ε is; ``hit`` and ``nearer`` as of
+    :func:`~rtl.intersection.unit_triangle`.
+
+    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; and a few additions and comparisons of exponents.
     """
     dp = Datapath(fmt, latencies=latencies)
     origin, direction = dp.vector("origin"), dp.vector("direction")
+    scale = {} if bound == "terms" else {name: dp.vector(f"{name}_scale") for name in ("origin", "direction")}
     t = dp.neg(dp.div(origin.z, direction.z))
-    scales = {}
-    if variant != "result":
-        scales = {name: dp.vector(f"{name}_scale") for name in ("origin", "direction")}
-    if variant == "conditioned":
-        # Digits that O′z and D′z have lost, and t with them.
-        loss = dp.power_max(*(dp.power_div(scales[name].z, dp.power(vector.z))
-                              for name, vector in (("origin", origin), ("direction", direction))))
-        if lcap is not None:
-            loss = dp.select(dp.is_within(loss, dp.const(lcap)), loss, dp.const(1.0 if lcap<0 else lcap))
-    unit = dp.const(2.0 ** -fmt.frac_width * ulp)
+    if bound in ("lean", "full"):
+        loss = dp.power_div(scale["direction"].z, dp.power(direction.z))
+    if bound == "full":
+        loss = dp.power_max(loss, dp.power_div(scale["origin"].z, dp.power(origin.z)))
     values, errors = [], []
     for axis in "xy":
         start, way = getattr(origin, axis), dp.mul(t, getattr(direction, axis))
         values.append(dp.add(start, way))
-        if variant == "result":
-            error = dp.power_max(dp.power(start), dp.power(way))
-        else:
-            error = dp.power_max(getattr(scales["origin"], axis),
-                                 dp.power_mul(dp.power(t), getattr(scales["direction"], axis)))
-        if variant == "conditioned":
+        error = dp.power(start) if bound == "terms" else getattr(scale["origin"], axis)
+        if bound in ("full", "products"):
+            error = dp.power_max(error, dp.power_mul(dp.power(t), getattr(scale["direction"], axis)))
+        if bound == "terms":
+            error = dp.power_max(error, dp.power(way))
+        elif bound != "products":
             error = dp.power_max(error, dp.power_mul(dp.power(way), loss))
-        error = dp.power_mul(error, unit)
-        if cap is not None:
-            error = dp.select(dp.is_within(error, dp.const(cap)), error, dp.const(cap))
-        errors.append(error)
-    u, v = values
-    inside = [dp.logical_or(dp.logical_not(dp.is_negative(value)), dp.is_within(value, error))
+        errors.append(dp.power_mul(error, dp.const(ulp * 2.0**-fmt.frac_width)))
+    cap, sum_of = dp.const(cap), dp.add(*values)
+    inside = [dp.logical_or(dp.logical_not(dp.is_negative(value)),
+                            dp.logical_and(dp.is_within(value, error), dp.is_within(value, cap)))
               for value, error in zip(values, errors, strict=True)]
-    inside.append(dp.is_at_most_one_plus(dp.add(u, v), dp.power_max(*errors)))
-    return outputs(dp, t, u, v, dp.logical_and(*inside))
+    inside += [dp.is_at_most_one_plus(sum_of, dp.power_max(*errors)), dp.is_at_most_one_plus(sum_of, cap)]
+    return outputs(dp, t, *values, dp.logical_and(*inside))
 
 
-def tolerant(ulp, variant="conditioned", cap=None, lcap=None):
-    """The method with a tolerance of ``ulp``, a power of two."""
-    if ulp < 1 or math.log2(ulp) % 1:
-        raise ValueError(f"Tolerance must be a power of two of units in the last place, not {ulp!r}")
-    suffix = f" {variant[:1]} {cap} {lcap}"
-    return Method(f"tolerant {ulp}{suffix}", stored_matrix, lambda fmt: tolerant_test(fmt, ulp=ulp, variant=variant, cap=cap, lcap=lcap),
+def tolerant(ulp, *, bound=BOUNDS[0], cap=CAP):
+    """The method with a tolerance of ``ulp`` units in the last place.
+
+    Raises
+    ------
+    ValueError
+        If ``ulp`` or ``cap`` is not a power of two, or there is no such bound.
+    """
+    if ulp <= 0 or math.log2(ulp) % 1 or math.log2(cap) % 1:
+        raise ValueError(f"Tolerance and cap must be powers of two, not {ulp!r} and {cap!r}")
+    if bound not in BOUNDS:
+        raise ValueError(f"Bound must be one of {', '.join(BOUNDS)}, not {bound!r}")
+
+    def test(fmt):
+        return tolerant_test(fmt, ulp=ulp, bound=bound, cap=cap)
+
+    return Method(f"tolerant {ulp}" if bound == BOUNDS[0] else f"{bound} {ulp}", stored_matrix, test,
                   point_map=scaled_map, needs_area=True)

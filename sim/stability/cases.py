@@ -1,10 +1,11 @@
 """The cases: what is swept, and the rays and triangles for each value of it."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from . import probes
+from . import chip, probes
 
 __all__ = ["CASES", "Case", "limits_of"]
 
@@ -23,6 +24,8 @@ class Case:
         The value of them with which a test has least trouble.
     probe : callable
         ``probe(value, count, fmt=, rng=)``: the :class:`~sim.stability.probe.Probe` of ``count`` rays.
+    is_of_chip : bool
+        It goes through the chip's model, and there is no other method than its own.
     """
 
     name: str
@@ -30,6 +33,7 @@ class Case:
     values: tuple
     easiest: float
     probe: object
+    is_of_chip: bool = False
 
     def rng(self, value):
         """The random numbers of a value, the same each time."""
@@ -58,6 +62,7 @@ def limits_of(case, failures):
 
 _TRIANGLES = 32, 288, 2592, 23328, 83232
 _COSINES = 0.001, 0.003, 0.01, 0.03, 0.1, 0.3
+_ANGLES = 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1
 _FRACTIONS = 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1
 _SCALES = 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3
 
@@ -66,7 +71,7 @@ CASES = {case.name: case for case in (
     Case("edges", "triangles of the closed mesh", _TRIANGLES, 32, probes.edges),
     Case("vertices", "triangles of the closed mesh", _TRIANGLES, 32, probes.vertices),
     Case("silhouettes", "cosine at the flatter of two triangles", _COSINES, 0.3, probes.silhouettes),
-    Case("grazing", "angle to the surface, rad", (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1), 1e-1, probes.grazing),
+    Case("grazing", "angle to the surface, rad", _ANGLES, 1e-1, probes.grazing),
     Case("slivers", "length over width", (1e1, 1e2, 1e3, 1e4, 1e5, 1e6), 1e1, probes.slivers),
     Case("size", "radius of the mesh over distance", (1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5), 1.0,
          probes.size),
@@ -84,4 +89,9 @@ CASES = {case.name: case for case in (
     Case("scale", "power of ten of everything", (-18, -15, -12, -9, -6, -3, 0, 3, 6, 9, 12, 15, 18), 0, probes.scale),
     Case("direction", "power of ten of the direction", (-15, -12, -9, -6, -3, 0, 3, 6, 9, 12, 15), 0,
          probes.direction),
+    Case("edges, chip", "triangles of the closed mesh", _TRIANGLES, 32, partial(chip.traversed, probes.edges), True),
+    Case("grazing, chip", "angle to the surface, rad", _ANGLES, 1e-1, partial(chip.traversed, probes.grazing), True),
+    Case("splitting planes, chip", "units in the last place off the plane, at most", (0, 1, 2, 4, 16), 0,
+         chip.in_splitting_planes, True),
+    Case("deep tree, chip", "squares one behind the other", (2, 4, 8, 16, 24), 2, chip.deep_tree, True),
 )}
