@@ -9,7 +9,6 @@ import click
 from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from fpu import FloatFormat
 from sim.methods import METHODS
 from sim.stability.cases import CASES, limits_of
 from sim.stability.truth import BLUR
@@ -17,9 +16,9 @@ from sim.stability.truth import BLUR
 from .costs import measured_luts
 from .errors import BadInput, clear_errors, written_whole
 from .options import FORMAT
+from .page import check_places, filled_page
 from .stability_page import PARTS
 from .stability_plots import draw_plots
-from .page import check_places, filled_page
 
 __all__ = ["measured", "stability"]
 

@@ -2,7 +2,7 @@
 
 import math
 
-from fpu import Datapath
+from fpu import Datapath, Vector
 
 from .method import Method
 from .parts import outputs
@@ -59,7 +59,9 @@ def tolerant_test(fmt, *, ulp, bound=BOUNDS[0], cap=CAP, latencies=None):
     """
     dp = Datapath(fmt, latencies=latencies)
     origin, direction = dp.vector("origin"), dp.vector("direction")
-    scale = {} if bound == "terms" else {name: dp.vector(f"{name}_scale") for name in ("origin", "direction")}
+    # Powers they are already; to say so again keeps their fractions out of the delays.
+    scale = {} if bound == "terms" else {
+        name: Vector(*map(dp.power, dp.vector(f"{name}_scale"))) for name in ("origin", "direction")}
     t = dp.neg(dp.div(origin.z, direction.z))
     if bound in ("lean", "full"):
         loss = dp.power_div(scale["direction"].z, dp.power(direction.z))

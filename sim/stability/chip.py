@@ -1,4 +1,4 @@
-"""Cases of traversal, which go through the chip's model: the scene compiler's image, kd-tree, stack and default test."""
+"""Cases of traversal, through the chip's model: the compiler's image, kd-tree, stack and default test."""
 
 from dataclasses import dataclass
 from functools import cached_property

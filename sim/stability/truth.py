@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..golden.tracer import trace
+from ..scene.error import SceneError
 from ..scene.material import DEFAULT_MATERIAL
 from ..scene.scene import IDENTITY, Instance, Mesh, Scene
 
@@ -103,7 +104,13 @@ def truth_of(corners, origins, directions, *, fmt, excluded=None, to_mesh=None):
     exclude = None if excluded is None else (np.where(excluded < 0, -1, 0), excluded)
     if exclude is not None:
         exclude = tuple(np.broadcast_to(number, directions.shape[:-1]) for number in exclude)
-    hits = trace(scene_of(corners), origins, directions, exclude=exclude)
+    try:
+        scene = scene_of(corners)
+    except SceneError:
+        # Nothing has an area once it is rounded.
+        nothing = np.full(directions.shape[1], np.inf)
+        return Truth(nothing, nothing, np.full(directions.shape[:2], -1), blur)
+    hits = trace(scene, origins, directions, exclude=exclude)
     return Truth(hits.t.min(axis=0), hits.t.max(axis=0), hits.prim_id, blur)
 
 

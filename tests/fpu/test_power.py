@@ -32,7 +32,7 @@ def expected(fmt, op, a, b):
     if op == "is_within":
         return x is not None and (y is None or abs(x) < y)
     limit = Fraction(1) if y is None else min(y, Fraction(1))
-    return a == -np.inf or x is not None and (x <= 1 or x < 1 + limit)
+    return a == -np.inf or (x is not None and (x <= 1 or x < 1 + limit))
 
 
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
