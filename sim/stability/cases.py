@@ -80,7 +80,7 @@ CASES = {case.name: case for case in (
          probes.far_recentred),
     Case("scaled instance", "scale along one axis", _SCALES, 1.0, probes.scaled_instance),
     Case("sheared instance", "shear", (0.0, 1e-1, 1.0, 1e1, 1e2, 1e3), 0.0, probes.sheared_instance),
-    Case("axis-parallel", "squares along a cube's edge", (1, 2, 3, 5, 8, 16), 1, probes.axis_parallel),
+    Case("axis-parallel", "squares along a cube's edge", (2, 3, 4, 5, 8, 16), 2, probes.axis_parallel),
     Case("nested", "gap over radius", (0.0, *_FRACTIONS), 1e-1, probes.nested),
     Case("degenerate", "height over length", (0.0, *_FRACTIONS), 1e-1, probes.degenerate),
     Case("leaving", "cosine to the normal", (*_COSINES, 1.0), 1.0, probes.leaving),

@@ -162,18 +162,19 @@ def sheared_instance(value, count, *, fmt, rng):
 def axis_parallel(value, count, *, fmt, rng):
     """Vertices and edges of a cube of ``value``² squares a face, met along the axes; what is 0 is so of either sign."""
     mesh = cube(value)
-    corners = fmt.quantize(mesh.corners)
-    mesh = Surface(fmt.quantize(mesh.vertices), mesh.triangles)
+    places, rows = fmt.quantize(np.unique(mesh.vertices[:, 0])), np.arange(count)
     axis, side = rng.integers(3, size=count), rng.choice((-1.0, 1.0), count)
-    rows = np.arange(count)
-    targets = np.where(rng.uniform(size=(count, 1)) < 0.5, mesh.on_vertices(count, rng),
-                       fmt.quantize(mesh.on_edges(count, rng)))
+    # On a line of the lattice one way, and on one or between them the other way.
+    targets = rng.choice(places[1:-1], (count, 3))
+    along = (axis + rng.integers(1, 3, count)) % 3
+    targets[rows, along] = np.where(rng.uniform(size=count) < 0.5, targets[rows, along],
+                                    fmt.quantize(rng.uniform(-0.99, 0.99, count)))
     targets[rows, axis] = side
     origins = targets.copy()
     origins[rows, axis] = fmt.quantize(side * rng.uniform(2, 4, count))
     directions = rng.choice((-0.0, 0.0), (count, 3))
     directions[rows, axis] = fmt.quantize(-side * rng.uniform(0.5, 2, count))
-    return Probe(fmt, corners, origins, directions)
+    return Probe(fmt, fmt.quantize(mesh.corners), origins, directions)
 
 
 def nested(value, count, *, fmt, rng):
