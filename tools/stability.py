@@ -32,7 +32,7 @@ def _row(method, case, value, probe, verdict):
     return {"method": method, "case": case.name, "parameter": value, "rays": probe.num_rays,
             "failures": int(verdict.is_failure.sum()), "cracks": int(verdict.is_crack.sum()),
             "phantoms": int(verdict.is_phantom.sum()), "distances": int(verdict.is_distance.sum()),
-            "odd": int(verdict.is_odd.sum()), "decided": int((truth.must_hit | truth.must_miss).sum())}
+            "odd": int(verdict.is_odd.sum()), "decided": int(truth.is_decided.sum())}
 
 
 def measured(case, value, *, fmt, num_rays, jobs=1):

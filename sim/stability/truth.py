@@ -50,12 +50,20 @@ class Truth:
         What each hits, −1 for none.
     slack : float
         Relative error that t may have besides.
+    is_there : bool
+        Whether any triangle has an area.
     """
 
     nearest: np.ndarray
     farthest: np.ndarray
     triangles: np.ndarray
     slack: float
+    is_there: bool = True
+
+    @property
+    def is_decided(self):
+        """bool[N]: all nine hit, or none does of a mesh that is there."""
+        return (self.must_hit | self.must_miss) & self.is_there
 
     @property
     def must_hit(self):
@@ -109,7 +117,7 @@ def truth_of(corners, origins, directions, *, fmt, excluded=None, to_mesh=None):
     except SceneError:
         # Nothing has an area once it is rounded.
         nothing = np.full(directions.shape[1], np.inf)
-        return Truth(nothing, nothing, np.full(directions.shape[:2], -1), blur)
+        return Truth(nothing, nothing, np.full(directions.shape[:2], -1), blur, is_there=False)
     hits = trace(scene, origins, directions, exclude=exclude)
     return Truth(hits.t.min(axis=0), hits.t.max(axis=0), hits.prim_id, blur)
 

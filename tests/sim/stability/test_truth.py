@@ -58,6 +58,7 @@ def test_what_is_odd_fails():
 def test_nothing_that_has_an_area():
     truth = truth_of(np.zeros((3, 3, 3)), np.array([(0.0, 0, 1)]), DOWN, fmt=FMT)
     assert truth.must_miss.all()
+    assert not truth.is_decided.any()
 
 
 def test_an_instance_is_where_its_map_takes_rays():
@@ -107,7 +108,7 @@ def test_rays_of_every_value(case):
             assert (FMT.quantize(array) == array).all()
         assert 0 < probe.num_rays <= 40
         assert probe.directions.any(axis=1).all()
-    assert (probe.truth.must_hit | probe.truth.must_miss).mean() > 0.5
+    assert probe.truth.is_decided.mean() > 0.5
 
 
 def test_what_is_known_to_fail_does():
