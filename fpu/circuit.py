@@ -8,6 +8,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from .delay import Delay
+from .power import POWER_LOGIC
 
 __all__ = ["Circuit"]
 
@@ -28,6 +29,7 @@ _LOGIC = {
     "or": lambda *flags: Cat(flags).any(),
     "not": lambda flag: ~flag,
     "select": lambda flag, a, b: Mux(flag, Value.cast(a), Value.cast(b)),
+    **POWER_LOGIC,
 }
 
 

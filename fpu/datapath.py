@@ -15,6 +15,7 @@ from .dot_product import DotProduct
 from .graph import Graph
 from .kernel import compile_kernel
 from .multiplier import Multiplier
+from .power import POWER_EMULATIONS
 from .reciprocal import Reciprocal
 from .reciprocal_square_root import ReciprocalSquareRoot
 from .rounding import Rounding
@@ -40,8 +41,8 @@ class Datapath(Graph):
         Format of all floats.
     latencies : dict from str to int
         Latency of ``"add"`` (also subtraction), ``"mul"``, ``"div"``, ``"cmp"``, ``"rec"``, ``"sqrt"``, ``"rsqrt"``,
-        ``"dot"`` and ``"select"``, in cycles. Missing ones are the operators' own defaults, or what ``clock_mhz`` asks
-        for; none for ``"select"``.
+        ``"dot"``, ``"select"`` and ``"power"`` (arithmetic on powers), in cycles. Missing ones are the operators' own
+        defaults, or what ``clock_mhz`` asks for; none for ``"select"``, 1 for ``"power"``.
     rounding : Rounding
         How all results are rounded, where there is a choice.
     operators : dict from str to type
@@ -64,7 +65,7 @@ class Datapath(Graph):
     def __init__(self, fmt, *, latencies=None, rounding=Rounding.NEAREST_EVEN, operators=None, guard_width=None,
                  clock_mhz=None):
         latencies, operators = dict(latencies or {}), dict(operators or {})
-        known = {*COUNTED_AS.values(), "select"}
+        known = {*COUNTED_AS.values(), "select", "power"}
         if not latencies.keys() <= known:
             raise ValueError(f"Latencies may be given for {', '.join(sorted(known))}, "
                              f"not for {', '.join(sorted(latencies.keys() - known))}")
@@ -75,7 +76,8 @@ class Datapath(Graph):
         self.guard_width = guard_width
         self.clock_mhz = clock_mhz
         self._operators = OPERATORS | operators
-        super().__init__(fmt, latencies={"select": latencies.get("select", 0)})
+        of_powers = dict.fromkeys(("power_max", "power_mul", "power_div"), latencies.get("power", 1))
+        super().__init__(fmt, latencies={"select": latencies.get("select", 0), **of_powers})
         self._given = latencies
 
     def latency_of_operator(self, op):
@@ -102,6 +104,8 @@ class Datapath(Graph):
 
     def emulation(self, op):
         """Compiled function for the nodes whose operation is ``op``, if it takes one."""
+        if op in POWER_EMULATIONS:
+            return POWER_EMULATIONS[op]
         emulations = getattr(self._operators.get(op), "emulation", {})
         # What cannot be told how to round rounds to nearest even.
         return emulations.get(self.rounding, emulations.get(Rounding.NEAREST_EVEN))

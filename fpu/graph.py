@@ -206,6 +206,32 @@ class Graph:
         """a ≤ 1: a matter of the exponent, which takes no comparator"""
         return self._node("is_at_most_one", a, is_flag=True)
 
+    # Powers of two, which bound errors: floats with no sign and no fraction
+
+    def power(self, a):
+        """2^⌊log₂|a|⌋: a's exponent; 0 of 0, ∞ of ∞"""
+        return self._node("power", a)
+
+    def power_max(self, a, b):
+        """The greater of two powers"""
+        return self._node("power_max", a, b)
+
+    def power_mul(self, a, b):
+        """a·b of two powers; 0·∞ = 0"""
+        return self._node("power_mul", a, b)
+
+    def power_div(self, a, b):
+        """a/b of two powers; 0/0 = ∞/∞ = 0"""
+        return self._node("power_div", a, b)
+
+    def is_within(self, a, power):
+        """|a| < power, a matter of the exponents; false of ∞"""
+        return self._node("is_within", a, power, is_flag=True)
+
+    def is_at_most_one_plus(self, a, power):
+        """a ≤ 1 or a < 1 + min(power, 1), which takes no adder"""
+        return self._node("is_at_most_one_plus", a, power, is_flag=True)
+
     def logical_and(self, *flags):
         """Whether all ``flags`` are set"""
         return self._node("and", *flags, flags=True, is_flag=True)

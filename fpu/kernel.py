@@ -21,6 +21,8 @@ _EXPRESSIONS = {
     "is_at_most_one": "{} <= 1.0",
     "not": "not {}",
     "select": "{1} if {0} else {2}",
+    "is_within": "abs({0}) < {1}",
+    "is_at_most_one_plus": "{0} <= 1.0 or {0} - 1.0 < min({1}, 1.0)",
 }
 _RELATIONS = {"lt": "<", "eq": "==", "gt": ">"}
 
@@ -54,7 +56,7 @@ def kernel_source(datapath, *, cache):
     lines = ["from math import copysign, inf", "", "import numba", ""]
     lines += [f"from {function.__module__} import {function.__name__} as {op}"
               for op, function in sorted(emulations.items())]
-    decorator = f"@numba.njit(error_model='numpy', cache={cache})"
+    decorator = f"@numba.njit(error_model='numpy', nogil=True, cache={cache})"
     lines += ["", "", decorator, f"def kernel({', '.join(['params', *inputs])}):"]
     for index, node in enumerate(nodes):
         if node.op not in ("input", "compare"):

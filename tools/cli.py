@@ -9,6 +9,7 @@ from .fpu_report import fpu_report
 from .inspect import image
 from .pipeline import pipeline
 from .render import render
+from .stability import stability
 
 __all__ = ["main"]
 
@@ -25,4 +26,5 @@ main.add_command(first_light)
 main.add_command(fpu_report)
 main.add_command(pipeline)
 main.add_command(render)
+main.add_command(stability)
 main.add_command(image)

@@ -10,8 +10,10 @@ from rtl.intersection import unit_triangle
 from rtl.layout import PACKET_RAYS
 from rtl.stack import worth_visiting
 from rtl.traversal import kd_step
+from sim.methods.plucker import plucker_test
+from sim.methods.projection import projection_test
 
-from .designs import plucker_test, projection_test, ray_shader
+from .designs import ray_shader
 
 __all__ = ["COLUMNS", "PAPER_COSTS", "PAPER_RATIOS", "cost_tables", "measured_luts"]
 
@@ -72,8 +74,8 @@ def cost_tables(*, fmt=None, luts=None):
     with 0 and 1, multiplexers and tables count nothing. Each design takes in one ray a clock in the intersection and
     four in the traversal. K: four of :func:`~rtl.traversal.kd_step` and of :func:`~rtl.stack.worth_visiting`;
     T: :func:`~rtl.affine_map.affine_map`; I: :func:`~rtl.intersection.unit_triangle`, without t_near;
-    I_w, I_p, S: :mod:`tools.designs`. The paper does not say what its I_w, I_p and S are, so there are variants:
-    S with refraction rays, I_p that stores nothing but vertices.
+    I_w, I_p: :mod:`sim.methods`; S: :mod:`tools.designs`. The paper does not say what its I_w, I_p and S are, so there
+    are variants: S with refraction rays, I_p that stores nothing but vertices.
 
     Parameters
     ----------

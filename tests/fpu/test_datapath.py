@@ -27,17 +27,19 @@ LOGIC = ["logical_and", "logical_or"]
 def datapaths(draw):
     """Random graphs with a few inputs, some of them late, and several outputs, some of them early."""
     latencies = draw(st.dictionaries(st.sampled_from([
-        "add", "mul", "div", "cmp", "rec", "sqrt", "rsqrt", "dot", "select"]), st.integers(0, 7)))
+        "add", "mul", "div", "cmp", "rec", "sqrt", "rsqrt", "dot", "select", "power"]), st.integers(0, 7)))
     dp = Datapath(FMT, latencies=latencies, rounding=draw(st.sampled_from(Rounding)),
                   operators=draw(st.sampled_from([{}, {"div": TableDivider}])),
                   guard_width=draw(st.sampled_from([None, 2, 3, 5])))
     floats = [dp.input(f"x{index}", delay=draw(st.integers(0, 9))) for index in range(draw(st.integers(1, 3)))]
     floats += [*dp.vector("v"), dp.const(draw(st.sampled_from([0.0, -0.0, 1.0, -0.3, 100.0, float("inf")])))]
     flags = [dp.flag("f", delay=draw(st.integers(0, 9)))]
+    powers = [dp.power(floats[0]), dp.const(draw(st.sampled_from([0.0, 0.125, 0.5, 2.0, float("inf")])))]
     for _ in range(draw(st.integers(1, 12))):
         def pick(nodes):
             return draw(st.sampled_from(nodes))
-        kind = draw(st.sampled_from(["unary", "binary", "binary", "dot", "relation", "test", "logic", "not", "select"]))
+        kind = draw(st.sampled_from(["unary", "binary", "binary", "dot", "relation", "test", "logic", "not", "select",
+                                     "power", "within"]))
         if kind == "unary":
             floats.append(getattr(dp, pick(UNARY))(pick(floats)))
         elif kind == "binary":
@@ -51,12 +53,19 @@ def datapaths(draw):
             flags.append(getattr(dp, pick(TESTS))(pick(floats)))
         elif kind == "logic":
             flags.append(getattr(dp, pick(LOGIC))(pick(flags), pick(flags), pick(flags)))
+        elif kind == "power":
+            powers.append(draw(st.sampled_from([
+                dp.power(pick(floats)), *(getattr(dp, f"power_{name}")(pick(powers), pick(powers))
+                                          for name in ("max", "mul", "div"))])))
+        elif kind == "within":
+            name = pick(["is_within", "is_at_most_one_plus"])
+            flags.append(getattr(dp, name)(pick(floats), pick(powers)))
         elif kind == "not":
             flags.append(dp.logical_not(pick(flags)))
         else:
             nodes = pick([floats, flags])
             nodes.append(dp.select(pick(flags), pick(nodes), pick(nodes)))
-    for index, node in enumerate([*floats[-3:], *flags[-2:]]):
+    for index, node in enumerate([*floats[-3:], *powers[-2:], *flags[-2:]]):
         dp.output(f"y{index}", node, early=draw(st.booleans()))
     return dp
 

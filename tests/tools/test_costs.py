@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from fpu import FloatFormat
+from sim.methods.plucker import plucker_test
+from sim.methods.projection import projection_test
 from tools.costs import COLUMNS, cost_tables, measured_luts
-from tools.designs import plucker_test, projection_test, ray_shader
+from tools.designs import ray_shader
 
 # Designs are counted without being built.
 pytestmark = pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")

@@ -1,0 +1,80 @@
+"""Powers of two: what bounds errors, in arithmetic on exponents alone."""
+
+import math
+from types import MappingProxyType
+
+from amaranth.hdl import Cat, Const, Mux
+
+from .rounding import emulated
+
+__all__ = ["POWER_EMULATIONS", "POWER_LOGIC", "power", "power_div", "power_max", "power_mul"]
+
+
+@emulated
+def power(params, a):
+    """2^⌊log₂|a|⌋; 0 of 0, ∞ of ∞."""
+    return a * a if a == 0.0 or math.isinf(a) else math.ldexp(0.5, math.frexp(a)[1])
+
+
+@emulated
+def power_max(params, a, b):
+    """The greater of two powers."""
+    return max(a, b)
+
+
+@emulated
+def power_mul(params, a, b):
+    """a·b of two powers; 0·∞ = 0."""
+    product = 0.0 if a == 0.0 or b == 0.0 else a * b
+    return 0.0 if product < params[1] else math.inf if product > params[2] else product
+
+
+@emulated
+def power_div(params, a, b):
+    """a/b of two powers; 0/0 = ∞/∞ = 0."""
+    if a == 0.0 or math.isinf(b):
+        return 0.0
+    quotient = math.inf if b == 0.0 else a / b
+    return 0.0 if quotient < params[1] else math.inf if quotient > params[2] else quotient
+
+
+#: Compiled emulation of each operation.
+POWER_EMULATIONS = MappingProxyType({"power": power, "power_max": power_max, "power_mul": power_mul,
+                                     "power_div": power_div})
+
+
+def _fitted(a, exp, *, is_zero, is_inf):
+    """A power of the signed exponent ``exp``, which is that of a format once it is fitted."""
+    fmt = a.shape()
+    below, above = exp < 1, exp >= fmt.exp_inf
+    stored = Mux(is_zero, 0, Mux(is_inf, fmt.exp_inf, Mux(below, 0, Mux(above, fmt.exp_inf, exp[:fmt.exp_width]))))
+    return Cat(Const(0, fmt.frac_width), stored[:fmt.exp_width])
+
+
+def _mul(a, b):
+    return _fitted(a, a.exp + b.exp - a.shape().bias, is_zero=(a.exp == 0) | (b.exp == 0),
+                   is_inf=a.exp.all() | b.exp.all())
+
+
+def _div(a, b):
+    return _fitted(a, a.exp - b.exp + a.shape().bias, is_zero=(a.exp == 0) | b.exp.all(),
+                   is_inf=a.exp.all() | (b.exp == 0))
+
+
+def _at_most_one_plus(a, power):
+    fmt = a.shape()
+    # A carry-free comparison of frac·2^−frac_width with the power: all places from the power's up must be 0.
+    frac_width, bias = fmt.frac_width, fmt.bias
+    over = Cat(a.frac[place] & (power.exp <= max(bias - frac_width + place, 0)) for place in range(frac_width)).any()
+    return a.sign | (a.exp < bias) | (a.exp == bias) & (~over | ~a.frac.any())
+
+
+#: What an operation is in terms of its operands.
+POWER_LOGIC = MappingProxyType({
+    "power": lambda a: Cat(Const(0, a.shape().frac_width), a.exp),
+    "power_max": lambda a, b: Cat(Const(0, a.shape().frac_width), Mux(a.exp >= b.exp, a.exp, b.exp)),
+    "power_mul": _mul,
+    "power_div": _div,
+    "is_within": lambda a, power: a.exp < power.exp,
+    "is_at_most_one_plus": _at_most_one_plus,
+})

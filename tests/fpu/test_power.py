@@ -1,0 +1,76 @@
+"""Powers of two: every pair, hardware and emulation against fractions."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from amaranth.sim import Simulator
+
+from fpu import Datapath, FloatFormat
+
+# A bias below and one above the width of the fraction.
+FORMATS = FloatFormat(3, 5), FloatFormat(4, 3)
+
+
+def exact(a):
+    return None if np.isinf(a) else Fraction(float(a))
+
+
+def fitted(fmt, a):
+    return 0.0 if a < Fraction(fmt.min_normal) else np.inf if a > Fraction(fmt.max) else float(a)
+
+
+def expected(fmt, op, a, b):
+    """What the operation's text says, by fractions."""
+    x, y = exact(a), exact(b)
+    if op == "power_max":
+        return max(a, b)
+    if op == "power_mul":
+        return 0.0 if 0.0 in (a, b) else np.inf if None in (x, y) else fitted(fmt, x * y)
+    if op == "power_div":
+        return 0.0 if a == 0.0 or y is None else np.inf if x is None or b == 0.0 else fitted(fmt, x / y)
+    if op == "is_within":
+        return x is not None and (y is None or abs(x) < y)
+    limit = Fraction(1) if y is None else min(y, Fraction(1))
+    return a == -np.inf or (x is not None and (x <= 1 or x < 1 + limit))
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+@pytest.mark.parametrize("op", ["power_max", "power_mul", "power_div", "is_within", "is_at_most_one_plus"])
+def test_every_pair(fmt, op):
+    powers = np.array([0.0, *(2.0 ** np.arange(1 - fmt.bias, fmt.exp_inf - fmt.bias)), np.inf])
+    every = np.unique(fmt.decode(np.arange(1 << fmt.width)))
+    first = every if op.startswith("is_") else powers
+    a, b = (pair.ravel() for pair in np.meshgrid(first, powers))
+    dp = Datapath(fmt, latencies={"power": 0})
+    dp.output("r", getattr(dp, op)(dp.input("a"), dp.input("b")))
+    model = dp.model(a=a, b=b)["r"]
+    wanted = np.array([expected(fmt, op, p, q) for p, q in zip(a, b, strict=True)])
+    assert (model == wanted).all()
+    assert len(np.unique(wanted)) > 1
+
+    dut, hardware = dp.component(), []
+    simulator = Simulator(dut)
+
+    async def testbench(ctx):
+        for p, q in zip(a, b, strict=True):
+            ctx.set(dut.a, float(p))
+            ctx.set(dut.b, float(q))
+            hardware.append(ctx.get(dut.r))
+
+    simulator.add_testbench(testbench)
+    simulator.run()
+    assert (np.array(hardware) == wanted).all()
+
+
+def test_power_of_a_float():
+    fmt = FloatFormat(4, 3)
+    dp = Datapath(fmt)
+    dp.output("r", dp.power(dp.input("a")))
+    a = fmt.decode(np.arange(1 << fmt.width))
+    finite = np.isfinite(a) & (a != 0)
+    r = dp.model(a=a)["r"]
+    assert (r[~finite] == np.abs(a[~finite])).all()
+    assert (r[finite] == 2.0 ** np.floor(np.log2(np.abs(a[finite])))).all()
+    assert dp.latency == 0
+    assert dp.cost() == {"add": 0, "mul": 0, "div": 0, "cmp": 0}
