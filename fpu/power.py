@@ -43,22 +43,24 @@ POWER_EMULATIONS = MappingProxyType({"power": power, "power_max": power_max, "po
                                      "power_div": power_div})
 
 
-def _fitted(a, exp, *, is_zero, is_inf):
-    """A power of the signed exponent ``exp``, which is that of a format once it is fitted."""
-    fmt = a.shape()
-    below, above = exp < 1, exp >= fmt.exp_inf
-    stored = Mux(is_zero, 0, Mux(is_inf, fmt.exp_inf, Mux(below, 0, Mux(above, fmt.exp_inf, exp[:fmt.exp_width]))))
-    return Cat(Const(0, fmt.frac_width), stored[:fmt.exp_width])
+def _fitted(fmt, total, *, is_zero, is_inf):
+    """A power whose exponent is ``total`` − 2^(exp_width − 1), fitted to the format."""
+    # The bias being one less than a power of two, taking it off is a matter of the two upper bits.
+    below = fmt.exp_width - 1
+    low, top = total[:below], total[below:below + 2]
+    none, full = is_zero | (top == 0), is_inf | (top == 3)
+    exp = Cat(low, top[1]) | full.replicate(fmt.exp_width)
+    return Cat(Const(0, fmt.frac_width), exp & ~none.replicate(fmt.exp_width))
 
 
 def _mul(a, b):
-    return _fitted(a, a.exp + b.exp - a.shape().bias, is_zero=(a.exp == 0) | (b.exp == 0),
-                   is_inf=a.exp.all() | b.exp.all())
+    is_zero = (a.exp == 0) | (b.exp == 0)
+    return _fitted(a.shape(), a.exp + b.exp + 1, is_zero=is_zero, is_inf=~is_zero & (a.exp.all() | b.exp.all()))
 
 
 def _div(a, b):
-    return _fitted(a, a.exp - b.exp + a.shape().bias, is_zero=(a.exp == 0) | b.exp.all(),
-                   is_inf=a.exp.all() | (b.exp == 0))
+    is_zero = (a.exp == 0) | b.exp.all()
+    return _fitted(a.shape(), a.exp + ~b.exp, is_zero=is_zero, is_inf=~is_zero & (a.exp.all() | (b.exp == 0)))
 
 
 def _at_most_one_plus(a, power):
