@@ -42,6 +42,9 @@ class ChipConfig:
         Bits of a pixel coordinate.
     arithmetic : int
         Which of :data:`~rtl.arithmetic.ARITHMETICS` it computes by.
+    edge_tolerance : int
+        By how much edges of triangles give, in units in the last place of what was added up: a power of two up to 64,
+        or 0 for none. Not with fused sums, whose products are not seen.
     num_pipelines : int
         Pipelines behind one ray generation controller, 1…4.
     shader : :class:`~rtl.program.features.ShaderFeatures`, optional
@@ -76,6 +79,7 @@ class ChipConfig:
     index_width: int = 24
     coord_width: int = 12
     arithmetic: int = 0
+    edge_tolerance: int = 0
     num_pipelines: int = 1
     shader: ShaderFeatures | None = None
     num_shaders: int = 1
@@ -92,6 +96,7 @@ class ChipConfig:
             "list_line_items": (1, 16), "matrix_lines": (2, 1 << 16), "num_fetches": (1, 16),
             "index_width": (8, 24), "coord_width": (4, 14),
             "arithmetic": (0, len(ARITHMETICS) - 1), "num_pipelines": (1, 4), "offset_log2": (0, 8),
+            "edge_tolerance": (0, 64),
             "num_shaders": (1, 4),
             "shading_lines": (2, 1 << 16), "texture_lines": (2, 1 << 16), "texture_line_items": (1, 16),
         }
@@ -103,6 +108,12 @@ class ChipConfig:
                      "shading_lines", "texture_lines", "texture_line_items", "num_shaders"):
             if getattr(self, name).bit_count() != 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be a power of two")
+
+        if self.edge_tolerance.bit_count() > 1:
+            raise ValueError(f"edge_tolerance is {self.edge_tolerance}; it must be a power of two, or 0")
+        if self.edge_tolerance and ARITHMETICS[self.arithmetic].fused:
+            raise ValueError(f"edge_tolerance is {self.edge_tolerance}, but arithmetic is {self.arithmetic} "
+                             f"('{ARITHMETICS[self.arithmetic].name}'), which does not show its products; it must be 0")
 
     @cached_property
     def program(self):

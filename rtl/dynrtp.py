@@ -132,10 +132,11 @@ class DynRTP(wiring.Component):
         m.submodules.mailboxed_list = mailboxed_list = MailboxedList(
             mailbox_entries=config.mailbox_entries, solid=has_shader, **widths)
         m.submodules.transformation = transformation = Transformation(
-            **computing, coord_width=config.coord_width, tag=tag, solid=has_shader, **widths)
+            **computing, coord_width=config.coord_width, tag=tag, solid=has_shader,
+            scaled=config.edge_tolerance > 0, **widths)
         m.submodules.intersection = intersection = Intersection(
             **computing, limited=has_shader, near=has_shader and config.shader.passes,
-            num_readers=num_readers, **widths)
+            num_readers=num_readers, tolerance=config.edge_tolerance, **widths)
 
         exhausted = self._trace(m, caches, stack, traversal, mailboxed_list, transformation, intersection)
         m.d.comb += [

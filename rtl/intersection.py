@@ -4,21 +4,34 @@ from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from fpu import Datapath, Delay
+from fpu import Datapath, Delay, Vector
 
 from .arithmetic import ARITHMETICS
-from .layout import PACKET_RAYS, thread_width, token_layout, vector_layout, with_token
+from .layout import PACKET_RAYS, scale_layout, thread_width, token_layout, vector_layout, with_token
 
 __all__ = ["Intersection", "hit_layout", "limits_layout", "unit_triangle"]
 
 
-def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False):
+#: No edge gives by more, in u and v: seen so exactly from its edge that t is lost, a triangle would reach out.
+MAX_TOLERANCE = 2.0**-6
+
+
+def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False, tolerant=False):
     """t = −O′z / D′z, u = O′x + t·D′x, v = O′y + t·D′y; ``hit`` if 0 < t < ∞, u ≥ 0, v ≥ 0 and u + v ≤ 1.
 
     ``nearer`` if t < t_hit, which comes in just in time, as late as t is known (paper §2.1.2). With ``near``
     it is t_near < t instead of 0 < t.
 
-    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator.
+    With ``tolerant`` it is u > −ε_u, v > −ε_v, u + v < 1 + max(ε_u, ε_v), where ε_u = ``tolerance`` times
+
+        max(s(O′x), |t·D′x|·s(D′z)/|D′z|), at most :data:`MAX_TOLERANCE`
+
+    in powers of two; s, the ``scale`` of :func:`~rtl.affine_map.affine_map`, is the largest of the products that were
+    added up. What rounding them does to O′x is the first term; the second is what t does, which divides by D′z = D·N
+    and loses what that has lost, where a ray grazes. What is 0 or more is inside whatever ε is.
+
+    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator; if tolerant, a few
+    additions and comparisons of exponents.
     """
     dp = Datapath(fmt, latencies=latencies, **arithmetic.parameters)
     origin, direction = dp.vector("origin"), dp.vector("direction")
@@ -26,18 +39,39 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False)
     t_hit = dp.input("t_hit", delay=dp.arrival(t))
     u = dp.add(origin.x, dp.mul(t, direction.x))
     v = dp.add(origin.y, dp.mul(t, direction.y))
+    inside = _tolerant(dp, t, u, v) if tolerant else dp.logical_and(
+        dp.logical_not(dp.is_negative(u)), dp.logical_not(dp.is_negative(v)), dp.is_at_most_one(dp.add(u, v)))
     if near:
         ahead = dp.logical_and(dp.is_finite(t), dp.lt(dp.input("t_near", delay=dp.arrival(t)), t))
     else:
         ahead = dp.logical_and(dp.is_finite(t), dp.logical_not(dp.sign(t)), dp.logical_not(dp.is_zero(t)))
-    inside = dp.logical_and(dp.logical_not(dp.is_negative(u)), dp.logical_not(dp.is_negative(v)),
-                            dp.is_at_most_one(dp.add(u, v)))
     dp.output("t", t)
     dp.output("u", u)
     dp.output("v", v)
     dp.output("hit", dp.logical_and(ahead, inside))
     dp.output("nearer", dp.lt(t, t_hit))
     return dp
+
+
+def _tolerant(dp, t, u, v):
+    """Whether a point is inside of edges that give, see :func:`unit_triangle`."""
+    # Powers they are already; to say so again keeps their fractions out of the delays.
+    scale = {name: Vector(*map(dp.power, dp.vector(f"{name}_scale"))) for name in ("origin", "direction")}
+    direction = {axis: dp.inputs[f"direction_{axis}"] for axis in "xyz"}
+    loss = dp.power_div(scale["direction"].z, dp.power(direction["z"]))
+    errors = []
+    for axis in "xy":
+        way = dp.power(dp.mul(t, direction[axis]))
+        errors.append(dp.power_max(getattr(scale["origin"], axis), dp.power_mul(way, loss)))
+    # A constant that needs no registers
+    tolerance = dp.input("tolerance", delay=max(map(dp.arrival, errors)))
+    errors, most = [dp.power_mul(error, tolerance) for error in errors], dp.const(MAX_TOLERANCE)
+    inside = [dp.logical_or(dp.logical_not(dp.is_negative(value)),
+                            dp.logical_and(dp.is_within(value, error), dp.is_within(value, most)))
+              for value, error in zip((u, v), errors, strict=True)]
+    total = dp.add(u, v)
+    return dp.logical_and(*inside, dp.is_at_most_one_plus(total, dp.power_max(*errors)),
+                          dp.is_at_most_one_plus(total, most))
 
 
 def hit_layout(*, fmt, index_width):
@@ -78,11 +112,13 @@ class Intersection(wiring.Component):
         Records that can be read at a time.
     near : bool
         Whether t_near is one of them; if not, it counts as 0.
+    tolerance : int
+        Of edges, in units in the last place; 0 for none.
 
     Members
     -------
-    vector : stream of ``{"token", "index", "is_origin", "ray", "first", "last", "solid", "vector"}``: rays in the
-        triangle's space, an origin before the directions that begin there
+    vector : stream of ``{"token", "index", "is_origin", "ray", "first", "last", "solid", "vector", "scale"}``: rays in
+        the triangle's space, an origin before the directions that begin there
     limit : stream of ``{"thread", "ray", "has_far", "t_far", "limits"}``: a ray that begins; if it has a ``t_far``, its
         record is that of a hit there of triangle number all ones (if ``limited``)
     entered : ``{"valid", "thread", "index"}``: the packet's next hits belong to that instance
@@ -93,7 +129,8 @@ class Intersection(wiring.Component):
     """
 
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, latencies=None,
-                 arithmetic=ARITHMETICS[0], limited=False, near=False, num_readers=1):
+                 arithmetic=ARITHMETICS[0], limited=False, near=False, num_readers=1, tolerance=0):
+        self._tolerance = tolerance
         self._num_readers = num_readers
         self._fmt = fmt
         self._near = near
@@ -111,7 +148,8 @@ class Intersection(wiring.Component):
             **({"limit": In(stream.Signature(begin))} if limited else {}),
             "vector": In(stream.Signature(with_token(
                 token, index=index_width, is_origin=1, ray=range(PACKET_RAYS), first=1, last=1,
-                solid=int(limited), vector=vector_layout(fmt)), always_ready=True)),
+                solid=int(limited), vector=vector_layout(fmt), scale=scale_layout(fmt, is_there=tolerance > 0)),
+                always_ready=True)),
             "entered": In(data.StructLayout({"valid": 1, "thread": thread_width(num_threads), "index": index_width})),
             "tested": Out(stream.Signature(token, always_ready=True)),
             "hit_address": In(thread_width(num_threads)),
@@ -126,7 +164,7 @@ class Intersection(wiring.Component):
         m = Module()
         num_slots = 1 << thread_width(self._num_threads)
         graph = unit_triangle(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic,
-                              near=self._near)
+                              near=self._near, tolerant=self._tolerance > 0)
         m.submodules.test = test = graph.component()
 
         vector = self.vector.payload
@@ -140,6 +178,8 @@ class Intersection(wiring.Component):
                 getattr(test, f"origin_{axis}").eq(getattr(origin, axis)),
                 getattr(test, f"direction_{axis}").eq(getattr(vector.vector, axis)),
             ]
+        if self._tolerance:
+            self._scale(m, test, vector)
 
         # The distance to beat has its address two cycles before it is wanted.
         beside_layout = data.StructLayout({"token": self._token, "ray": range(PACKET_RAYS), "first": 1, "last": 1,
@@ -244,6 +284,17 @@ class Intersection(wiring.Component):
             self._limit(m, test, to_ask.o, to_end.o, cycles=graph.latency - ask_at, instances=instances,
                         allowed=allowed, is_over=is_over)
         return m
+
+    def _scale(self, m, test, vector):
+        """How much rounding may have changed origin and direction goes beside them."""
+        fmt = self._fmt
+        origin_scale = Signal(vector.scale.shape(), reset_less=True)
+        with m.If(self.vector.valid & vector.is_origin):
+            m.d.sync += origin_scale.eq(vector.scale)
+        for name, scale in (("origin", origin_scale), ("direction", vector.scale)):
+            for number, axis in enumerate("xyz"):
+                m.d.comb += getattr(test, f"{name}_scale_{axis}").exp.eq(scale[number])
+        m.d.comb += test.tolerance.eq(fmt.const(self._tolerance * 2.0**-fmt.frac_width))
 
     def _limit(self, m, test, asking, done, *, cycles, instances, allowed, is_over):
         """Looks up the limits of the ray ``asking``, ``cycles`` before it is ``done``."""

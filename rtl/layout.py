@@ -14,6 +14,7 @@ __all__ = [
     "list_entry_layout",
     "matrix_layout",
     "node_layout",
+    "scale_layout",
     "thread_slots",
     "thread_width",
     "token_layout",
@@ -78,6 +79,11 @@ def token_layout(*, num_threads, stack_depth):
         "sp": range(stack_depth + 1),
         "interval": IntervalSource,
     })
+
+
+def scale_layout(fmt, *, is_there):
+    """Exponents of the ``scale`` of :func:`~rtl.affine_map.affine_map`, of three rows; of none if it is not there."""
+    return data.ArrayLayout(fmt.exp_width, 3 if is_there else 0)
 
 
 def with_token(token, **members):

@@ -8,7 +8,7 @@ from fpu import Delay, IntToFloat
 
 from .affine_map import affine_map
 from .arithmetic import ARITHMETICS
-from .layout import PACKET_RAYS, IntervalSource, matrix_layout, token_layout, vector_layout, with_token
+from .layout import PACKET_RAYS, IntervalSource, matrix_layout, scale_layout, token_layout, vector_layout, with_token
 from .microcode import Store
 from .ray_store import RayStore, ray_store_ports
 from .transformation_jobs import Kind, TransformationJobs
@@ -39,6 +39,8 @@ class Transformation(wiring.Component):
         What the shader sends with a vector; None if there is none.
     solid : bool
         Whether it is known of triangles if they let light through.
+    scaled : bool
+        Whether vectors in a triangle's space come with their scale.
 
     Members
     -------
@@ -52,15 +54,16 @@ class Transformation(wiring.Component):
     matrix : stream of ``{"item", "payload": {"token", "index", "instance"}}``: from the matrix cache
     write : to the :class:`~rtl.ray_store.RayStore`
     start : stream of ``{"token", "node"}``: rays are in the store and begin at a node
-    vector : stream of ``{"token", "index", "is_origin", "ray", "first", "last", "vector"}``: in a triangle's space;
-        ``first`` is the first direction
+    vector : stream of ``{"token", "index", "is_origin", "ray", "first", "last", "vector", "scale"}``: in a triangle's
+        space; ``first`` is the first direction
     entered : ``{"valid", "thread", "index"}``: the packet's next hits belong to that instance
     busy : a vector is taken in
     """
 
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, coord_width, latencies=None,
-                 arithmetic=ARITHMETICS[0], tag=None, solid=False):
+                 arithmetic=ARITHMETICS[0], tag=None, solid=False, scaled=False):
         self._fmt = fmt
+        self._scaled = scaled
         self._latencies = latencies
         self._arithmetic = arithmetic
         self._half_width = coord_width + 2
@@ -84,7 +87,8 @@ class Transformation(wiring.Component):
             "start": Out(stream.Signature(with_token(token, node=index_width), always_ready=True)),
             "vector": Out(stream.Signature(with_token(
                 token, index=index_width, is_origin=1, ray=range(PACKET_RAYS), first=1, last=1,
-                solid=int(solid), vector=vector_layout(fmt)), always_ready=True)),
+                solid=int(solid), vector=vector_layout(fmt), scale=scale_layout(fmt, is_there=scaled)),
+                always_ready=True)),
             "busy": Out(1),
         })
 
@@ -120,7 +124,7 @@ class Transformation(wiring.Component):
             with m.If(to_map.o.about.kind == Kind.CAMERA):
                 m.d.comb += [vector.x.eq(screen[0]), vector.y.eq(screen[1]), vector.z.eq(self._fmt.const(1.0))]
 
-        graph = affine_map(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic)
+        graph = affine_map(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic, scaled=self._scaled)
         m.submodules.map = mapping = graph.component()
         m.d.comb += mapping.is_point.eq(to_map.o.about.is_origin)
         for axis in "xyz":
@@ -158,6 +162,9 @@ class Transformation(wiring.Component):
             self.vector.payload.last.eq(out.last),
             self.vector.payload.vector.eq(mapped),
         ]
+        if self._scaled:
+            m.d.comb += [self.vector.payload.scale[number].eq(getattr(mapping, f"result_scale_{axis}").exp)
+                         for number, axis in enumerate("xyz")]
         if has_shader:
             is_step = out.kind == Kind.STEP
             with m.If(is_step):

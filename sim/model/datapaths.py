@@ -6,7 +6,7 @@ from rtl.arithmetic import ARITHMETICS
 
 from .compiled import compiled
 
-__all__ = ["affine_map", "kd_step", "unit_triangle"]
+__all__ = ["affine_map", "kd_step", "scaled_map", "tolerant_triangle", "unit_triangle"]
 
 # The kernels are the same for every format, which they take as an argument.
 _ANY = FloatFormat(7, 16)
@@ -26,6 +26,10 @@ _step_multiplied = _kernel(traversal.kd_step, _RECIPROCAL)
 # With t_near = 0 that of limited rays is the same as that of others.
 _triangle_nearest = _kernel(intersection.unit_triangle, near=True)
 _triangle_truncated = _kernel(intersection.unit_triangle, _TRUNCATED, near=True)
+_scaled_separate, _scaled_truncated = (
+    _kernel(transformation.affine_map, number, scaled=True) for number in (0, _TRUNCATED))
+_tolerant_nearest, _tolerant_truncated = (
+    _kernel(intersection.unit_triangle, number, near=True, tolerant=True) for number in (0, _TRUNCATED))
 
 
 # Where an arithmetic does not differ in its results it takes the first one's kernel: a quotient by table is the same.
@@ -58,3 +62,19 @@ def unit_triangle(arithmetic, params, *operands):
     if arithmetic == _TRUNCATED:
         return _triangle_truncated(params, *operands)
     return _triangle_nearest(params, *operands)
+
+
+@compiled()
+def scaled_map(arithmetic, params, *operands):
+    """See :func:`rtl.transformation.affine_map`: results and their scales, which fused sums do not have."""
+    if arithmetic == _TRUNCATED:
+        return _scaled_truncated(params, *operands)
+    return _scaled_separate(params, *operands)
+
+
+@compiled()
+def tolerant_triangle(arithmetic, params, *operands):
+    """See :func:`rtl.intersection.unit_triangle`, with edges that give."""
+    if arithmetic == _TRUNCATED:
+        return _tolerant_truncated(params, *operands)
+    return _tolerant_nearest(params, *operands)

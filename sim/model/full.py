@@ -73,7 +73,7 @@ def _shade_packet(tracing, offset_log2, one_bits, program, kinds, record_floats,
     int
         0, or which stack was too small.
     """
-    arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth = tracing
+    arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, tolerance = tracing
     # No program reads what it has not written: not-a-numbers would show.
     floats, integers = np.full((4, 64, 3), np.nan), np.full((4, 64, 3), -77, np.int64)
     stack_floats, stack_integers = np.empty((4, stack_size, 3)), np.empty((4, stack_size, 3), np.int64)
@@ -123,7 +123,8 @@ def _shade_packet(tracing, offset_log2, one_bits, program, kinds, record_floats,
         if mask:
             shader_counts[_TRACES] += 1
             if not trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth,
-                                origins, directions, mask, limits, excluded, flags, is_shared, hits, owners, counts):
+                                tolerance, origins, directions, mask, limits, excluded, flags, is_shared, hits, owners,
+                                counts):
                 return _TRIANGLE_STACK
             if is_first:
                 first_hits[:], first_owners[:] = hits, owners
@@ -132,9 +133,9 @@ def _shade_packet(tracing, offset_log2, one_bits, program, kinds, record_floats,
 
 
 @compiled(parallel=True)
-def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, offset_log2,
-            one_bits, program, kinds, record_floats, record_integers, texels, linear, dark, bright, floats, integers,
-            stack_size, packets, x, y, width, height, colors, hits, owners, counts, shader_counts, failures):
+def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, tolerance,
+            offset_log2, one_bits, program, kinds, record_floats, record_integers, texels, linear, dark, bright, floats,
+            integers, stack_size, packets, x, y, width, height, colors, hits, owners, counts, shader_counts, failures):
     for number in numba.prange(len(packets)):
         px, py = packets[number]
         screen, packet_colors = np.ones((4, 3)), np.zeros((4, 3), np.int64)
@@ -146,8 +147,8 @@ def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_en
                 mask |= 1 << ray
                 screen[ray, 0], screen[ray, 1] = x[column], y[row]
         failures[number] = _shade_packet(
-            (arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth), offset_log2,
-            one_bits, program, kinds, record_floats, record_integers, texels, (linear, dark, bright),
+            (arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, tolerance),
+            offset_log2, one_bits, program, kinds, record_floats, record_integers, texels, (linear, dark, bright),
             (floats, integers), screen, mask, stack_size, packet_colors, packet_hits, packet_owners, counts[number],
             shader_counts[number])
         for ray in range(4):
@@ -171,8 +172,8 @@ def render_full(image: SceneImage, camera, width, height, *, config, depth=4):
     width, height : int
         Size of the picture in pixels.
     config : ChipConfig
-        The chip, of which mailbox, stack, arithmetic, offset and shader matter; without a shader it gets the least that
-        draws all that is in the scene.
+        The chip, of which mailbox, stack, arithmetic, tolerance, offset and shader matter; without a shader it gets the
+        least that draws all that is in the scene.
     depth : int
         Generations of secondary rays, 0…16, of a chip without a shader.
 
@@ -206,7 +207,8 @@ def render_full(image: SceneImage, camera, width, height, *, config, depth=4):
     failures = np.zeros(len(packets), np.int64)
     _render(config.arithmetic, fmt.params, image.root, image.nodes[:, 0].astype(np.int64), image.split_values(),
             image.lists.astype(np.int64), image.matrix_values(), config.mailbox_entries, config.stack_depth,
-            config.offset_log2, int(fmt.encode(1.0)), instructions, kinds, *image.record_lanes(), image.texels,
+            config.edge_tolerance * 2.0**-fmt.frac_width, config.offset_log2, int(fmt.encode(1.0)), instructions, kinds,
+            *image.record_lanes(), image.texels,
             linear, dark, bright, floats, integers, max(stack_words(features), 1), packets, x, y, width, height,
             colors, hits, owners, counts, shader_counts, failures)
     for failure, what in ((_TRIANGLE_STACK, f"the {config.stack_depth} traversal stack entries"),

@@ -26,8 +26,8 @@ def camera_rows(image, camera, width):
 
 
 @compiled(parallel=True)
-def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, camera, packets,
-            x, y, width, height, hits, owners, counts, whole):
+def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, tolerance,
+            camera, packets, x, y, width, height, hits, owners, counts, whole):
     for number in numba.prange(len(packets)):
         px, py = packets[number]
         matrix = np.zeros((4, 3))
@@ -47,8 +47,8 @@ def _render(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_en
                 counts[number, VECTORS] += 1
         counts[number, VECTORS] += 1
         whole[number] = trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries,
-                                     stack_depth, origins, directions, mask, limits, excluded, flags, True,
-                                     packet_hits, packet_owners, counts[number])
+                                     stack_depth, tolerance, origins, directions, mask, limits, excluded, flags,
+                                     True, packet_hits, packet_owners, counts[number])
         for ray in range(4):
             if mask >> ray & 1:
                 hits[py + (ray >> 1), px + (ray & 1)] = packet_hits[ray]
@@ -67,7 +67,7 @@ def render_model(image: SceneImage, camera, width, height, *, config, background
     width, height : int
         Size of the picture in pixels.
     config : ChipConfig
-        The chip, of which mailbox, stack and arithmetic matter.
+        The chip, of which mailbox, stack, arithmetic and tolerance matter.
     background : tuple of int
         Colour of rays that hit nothing.
 
@@ -92,7 +92,8 @@ def render_model(image: SceneImage, camera, width, height, *, config, background
     whole = np.zeros(len(packets), np.bool_)
     _render(config.arithmetic, fmt.params, image.root, image.nodes[:, 0].astype(np.int64), image.split_values(),
             image.lists.astype(np.int64), image.matrix_values(), config.mailbox_entries, config.stack_depth,
-            camera_rows(image, camera, width), packets, x, y, width, height, hits, owners, counts, whole)
+            config.edge_tolerance * 2.0**-fmt.frac_width, camera_rows(image, camera, width), packets, x, y, width,
+            height, hits, owners, counts, whole)
     if not whole.all():
         x, y = packets[np.flatnonzero(~whole)[0]]
         raise OverflowError(f"the packet at pixel ({x}, {y}) needs more than the {config.stack_depth} stack entries "

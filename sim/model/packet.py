@@ -4,7 +4,7 @@ import numpy as np
 
 from ..scene.image import INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, SOLID_ENTRY, UPPER_EMPTY
 from .compiled import compiled
-from .datapaths import affine_map, kd_step, unit_triangle
+from .datapaths import affine_map, kd_step, scaled_map, tolerant_triangle, unit_triangle
 
 __all__ = ["ANY_HIT", "COUNTS", "HAS_LIMIT", "SAME_ORIGIN", "VECTORS", "trace_packet", "transform"]
 
@@ -27,8 +27,16 @@ def transform(arithmetic, params, matrix, vector, is_point):
 
 
 @compiled()
-def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, origins,
-                 directions, mask, limits, excluded, flags, is_shared, hits, owners, counts):
+def _transform_scaled(arithmetic, params, matrix, vector, is_point):
+    """As :func:`transform`, and behind it the scale of each row."""
+    return scaled_map(arithmetic, params, is_point, vector[0], vector[1], vector[2],
+                      matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[0, 0], matrix[0, 1], matrix[0, 2],
+                      matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[2, 0], matrix[2, 1], matrix[2, 2])
+
+
+@compiled()
+def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailbox_entries, stack_depth, tolerance,
+                 origins, directions, mask, limits, excluded, flags, is_shared, hits, owners, counts):
     """Traces four rays; see :func:`~sim.model.model.render_model` for what the arrays hold.
 
     Parameters
@@ -39,6 +47,8 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
         ``fmt.params``.
     root, nodes, splits, lists, matrices
         The memory image, floats decoded.
+    tolerance : float
+        Of triangles' edges, 0 for none: units in the last place, as a part of 1.
     origins, directions : float64[4, 3]
         The rays.
     mask : int
@@ -64,7 +74,7 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
         False if the stack is too small.
     """
     origin = np.empty((2, 4, 3))
-    mapped = np.empty((4, 3))
+    mapped, mapped_scale = np.empty((4, 3)), np.empty((4, 3))
     direction = np.empty((2, 4, 3))
     interval = np.empty((2, 4, 2))
     stack_node = np.empty((2, stack_depth), np.int64)
@@ -201,13 +211,25 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
                 counts[_TESTS] += 1
                 # A shared origin's map is that of the first ray.
                 if is_first or not is_shared:
-                    mapped[ray] = transform(arithmetic, params, matrix, origin[level, ray], True)
+                    if tolerance:
+                        (mapped[ray, 0], mapped[ray, 1], mapped[ray, 2], mapped_scale[ray, 0], mapped_scale[ray, 1],
+                         mapped_scale[ray, 2]) = _transform_scaled(arithmetic, params, matrix, origin[level, ray], True)
+                    else:
+                        mapped[ray] = transform(arithmetic, params, matrix, origin[level, ray], True)
                     first = ray
                 is_first = False
                 here = mapped[first]
-                dx, dy, dz = transform(arithmetic, params, matrix, direction[level, ray], False)
-                t, u, v, hit, nearer = unit_triangle(arithmetic, params, here[0], here[1], here[2], dx, dy, dz,
-                                                     hits[ray, 0], limits[ray, 0])
+                if tolerance:
+                    scale = mapped_scale[first]
+                    dx, dy, dz, scale_x, scale_y, scale_z = _transform_scaled(
+                        arithmetic, params, matrix, direction[level, ray], False)
+                    t, u, v, hit, nearer = tolerant_triangle(
+                        arithmetic, params, here[0], here[1], here[2], dx, dy, dz, hits[ray, 0], scale[0], scale[1],
+                        scale[2], scale_x, scale_y, scale_z, tolerance, limits[ray, 0])
+                else:
+                    dx, dy, dz = transform(arithmetic, params, matrix, direction[level, ray], False)
+                    t, u, v, hit, nearer = unit_triangle(arithmetic, params, here[0], here[1], here[2], dx, dy, dz,
+                                                         hits[ray, 0], limits[ray, 0])
                 if (hit and (nearer or not has_distance >> ray & 1)
                         and not (index == excluded[ray, 0] and owner == excluded[ray, 1])):
                     hits[ray, 0], hits[ray, 1], hits[ray, 2], hits[ray, 3] = t, u, v, dz

@@ -25,7 +25,7 @@ def _trace(params, root, nodes, splits, lists, matrices, stack_depth, origins, d
         hits, owner = np.empty((4, 4)), np.empty((4, 2), np.int64)
         first = 4 * packet
         whole[packet] = trace_packet(
-            0, params, root, nodes, splits, lists, matrices, _MAILBOX, stack_depth, origins[first:first + 4],
+            0, params, root, nodes, splits, lists, matrices, _MAILBOX, stack_depth, 0.0, origins[first:first + 4],
             directions[first:first + 4], 15, np.zeros((4, 2)), np.full((4, 2), -1, np.int64), np.zeros(4, np.int64),
             False, hits, owner, np.zeros(len(COUNTS), np.int64))
         for ray in range(4):

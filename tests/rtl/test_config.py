@@ -32,11 +32,20 @@ def test_the_paper_s_prototype():
     ("node_lines", 48, "node_lines is 48; it must be a power of two"),
     ("list_line_items", 3, "list_line_items is 3; it must be a power of two"),
     ("add_latency", -1, "add_latency is -1; it must be from 0 to 32"),
+    ("edge_tolerance", 65, "edge_tolerance is 65; it must be from 0 to 64"),
+    ("edge_tolerance", 6, "edge_tolerance is 6; it must be a power of two, or 0"),
 ])
 def test_what_is_refused(name, value, says):
     with pytest.raises(ValueError) as error:
         ChipConfig(**{name: value})
     assert str(error.value) == says
+
+
+def test_fused_sums_have_no_tolerance():
+    with pytest.raises(ValueError) as error:
+        ChipConfig(edge_tolerance=4, arithmetic=1)
+    assert str(error.value) == ("edge_tolerance is 4, but arithmetic is 1 ('fused'), which does not show its products; "
+                                "it must be 0")
 
 
 def test_it_is_frozen():

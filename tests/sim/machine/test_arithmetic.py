@@ -1,5 +1,7 @@
 """The chip in each arithmetic draws what the model draws in it."""
 
+from dataclasses import replace
+
 import pytest
 
 from fpu import FloatFormat
@@ -26,6 +28,22 @@ def test_chip_is_model(number):
     model = render_model(image, scene.default_camera(), *SIZE, config=config)
     assert not frame.differs(model).any()
     assert (frame.prim_id >= 0).any()
+
+
+@pytest.mark.parametrize("number", [0, 3], ids=["separate", "truncated"])
+def test_edges_that_give(number):
+    scene = soup_scene(1, count=12)
+    config = ChipConfig(fmt=FMT, arithmetic=number, edge_tolerance=8, num_threads=2, stack_depth=8, node_lines=8,
+                        list_lines=8, matrix_lines=8, mailbox_entries=0, add_latency=1, mul_latency=1, div_latency=2,
+                        cmp_latency=1)
+    image, camera = compile_scene(scene, fmt=FMT, stack_depth=config.stack_depth), scene.default_camera()
+    frame = render_pysim(image, camera, *SIZE, config=config)
+    assert not frame.differs(render_model(image, camera, *SIZE, config=config)).any()
+    # Triangles get larger by it, and no smaller.
+    wide, narrow = (render_model(image, camera, 64, 48, config=replace(config, edge_tolerance=tolerance))
+                    for tolerance in (8, 0))
+    assert (wide.prim_id >= 0).sum() > (narrow.prim_id >= 0).sum()
+    assert (wide.prim_id >= 0)[narrow.prim_id >= 0].all()
 
 
 def test_they_differ():

@@ -30,7 +30,7 @@ def trace(image, *, near=0.0, far=None, flags=0, excluded=(-1, -1), origins=None
     directions = np.array([(x, y, 1.0) for x in (0.0, 0.01) for y in (0.0, 0.01)])
     limits = np.tile((near, far or 0.0), (4, 1))
     assert trace_packet(0, FORMAT.params, image.root, image.nodes[:, 0].astype(np.int64), image.split_values(),
-                        image.lists.astype(np.int64), image.matrix_values(), 4, 32, FORMAT.quantize(origins),
+                        image.lists.astype(np.int64), image.matrix_values(), 4, 32, 0.0, FORMAT.quantize(origins),
                         FORMAT.quantize(directions), 15, limits, np.tile(np.array(excluded), (4, 1)),
                         np.full(4, flags | (0 if far is None else HAS_LIMIT)), shared, hits, owners, counts)
     missed = owners[:, 0] < 0

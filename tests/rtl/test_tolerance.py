@@ -1,0 +1,79 @@
+"""Edges that give: the chip's datapaths against the definition, in fractions of powers of two."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fpu import FloatFormat
+from rtl.affine_map import affine_map
+from rtl.arithmetic import ARITHMETICS
+from rtl.intersection import MAX_TOLERANCE, unit_triangle
+
+FMT = FloatFormat(7, 16)
+COUNT = 3000
+FUSED = next(arithmetic for arithmetic in ARITHMETICS if arithmetic.fused)
+
+
+def power(value):
+    return 2.0 ** math.floor(math.log2(abs(value))) if value else 0.0
+
+
+def random(rng, shape, spread=6):
+    return FMT.quantize(rng.normal(size=shape) * 2.0 ** rng.integers(-spread, spread, shape))
+
+
+def test_scale_is_the_largest_product_s():
+    rng = np.random.default_rng(1)
+    rows, vector, center = random(rng, (COUNT, 3, 3)), random(rng, (COUNT, 3)), random(rng, (COUNT, 3))
+    inputs = {f"row{row}_{axis}": rows[:, row, k] for row in range(3) for k, axis in enumerate("xyz")}
+    inputs |= {f"vector_{axis}": vector[:, k] for k, axis in enumerate("xyz")}
+    inputs |= {f"center_{axis}": center[:, k] for k, axis in enumerate("xyz")}
+    plain, scaled = affine_map(FMT), affine_map(FMT, scaled=True)
+    for is_point in (True, False):
+        found = scaled.model(is_point=is_point, **inputs)
+        without = plain.model(is_point=is_point, **inputs)
+        moved = FMT.quantize(vector - center) if is_point else vector
+        for row, axis in enumerate("xyz"):
+            assert (found[f"result_{axis}"] == without[f"result_{axis}"]).all()
+            products = FMT.quantize(rows[:, row] * moved)
+            assert found[f"result_scale_{axis}"].tolist() == [max(map(power, three)) for three in products.tolist()]
+
+
+def test_fused_sums_have_no_scale():
+    with pytest.raises(ValueError) as error:
+        affine_map(FMT, arithmetic=FUSED, scaled=True)
+    assert str(error.value) == "No scale is known of dot products: arithmetic 'fused' cannot be scaled"
+
+
+@pytest.mark.parametrize("ulp", [1, 8, 64])
+def test_edges_give_by_what_was_lost(ulp):
+    rng = np.random.default_rng(ulp)
+    origin, direction = random(rng, (COUNT, 3), 2), random(rng, (COUNT, 3), 2)
+    # Points close to an edge, or to the one across.
+    t = -origin[:, 2] / direction[:, 2]
+    place = rng.choice([0.0, 1e-5, -1e-5, -3e-4, -2e-2, 0.5, 1.0, 1.00002, 1.01], (COUNT, 2))
+    origin[:, :2] = FMT.quantize(place - t[:, None] * direction[:, :2])
+    scales = {name: np.array([[power(x) for x in vector] for vector in values]) * 2.0 ** rng.integers(0, 6, (COUNT, 3))
+              for name, values in (("origin", origin), ("direction", direction))}
+    tolerance = ulp * 2.0**-16
+    inputs = {f"{name}_{axis}": values[:, k] for name, values in (("origin", origin), ("direction", direction))
+              for k, axis in enumerate("xyz")} | {"t_hit": np.full(COUNT, np.inf)}
+    tolerant = inputs | {f"{name}_scale_{axis}": values[:, k] for name, values in scales.items()
+                         for k, axis in enumerate("xyz")} | {"tolerance": np.full(COUNT, tolerance)}
+    plain, found = unit_triangle(FMT).model(**inputs), unit_triangle(FMT, tolerant=True).model(**tolerant)
+    hits = 0
+    for i in range(COUNT):
+        u, v, t = (float(plain[name][i]) for name in ("u", "v", "t"))
+        assert (u, v, t) == tuple(float(found[name][i]) for name in ("u", "v", "t"))
+        loss = scales["direction"][i, 2] / power(direction[i, 2])
+        limits = [min(tolerance * max(scales["origin"][i, k], power(FMT.quantize(t * direction[i, k])) * loss),
+                      MAX_TOLERANCE) for k in (0, 1)]
+        inside = all(x >= 0 or abs(x) < limit for x, limit in zip((u, v), limits, strict=True))
+        total = float(FMT.quantize(u + v))
+        inside &= total <= 1 or total < 1 + max(limits)
+        assert bool(found["hit"][i]) == (inside and 0 < t < np.inf)
+        hits += bool(found["hit"][i]) and not plain["hit"][i]
+        # Nothing is lost.
+        assert found["hit"][i] or not plain["hit"][i]
+    assert hits > COUNT / 200
