@@ -20,8 +20,10 @@ __all__ = ["chart"]
 
 SIZE = 384, 288
 FORMATS = ("5.8", "5.10", "6.10", "6.12", "7.12", "6.14", "7.14", "7.16", "7.18", "7.20", "7.23", "8.23")
-#: Those that differ in their pictures.
-VARIANTS = ("separate", "fused", "truncated", "reciprocal")
+_NUMBERS = {arithmetic.name: number for number, arithmetic in enumerate(ARITHMETICS)}
+#: Parameters of chips that differ in their pictures, by name.
+VARIANTS = {**{name: {"arithmetic": _NUMBERS[name]} for name in ("separate", "fused", "truncated", "reciprocal")},
+            **{f"tolerant {ulp}": {"edge_tolerance": ulp} for ulp in (2, 4, 8)}}
 _SCENES = (*SCENES, ("sunflowers", None, None))
 _ROOT = Path(__file__).parents[1]
 
@@ -51,7 +53,6 @@ def chart(scenes, docs, only, formats):
     """
     console = Console(stderr=True, highlight=False)
     page, path, version = docs / "accuracy.md", docs / "results" / "accuracy.json", _version()
-    numbers = {arithmetic.name: number for number, arithmetic in enumerate(ARITHMETICS)}
     with clear_errors():
         # Before the long work
         filled(page, [])
@@ -65,7 +66,7 @@ def chart(scenes, docs, only, formats):
                 if not missing:
                     continue
                 truth = truth or Truth(scene, camera, SIZE)
-                measured = truth.measure(FloatFormat.parse(fmt), {variant: numbers[variant] for variant in missing})
+                measured = truth.measure(FloatFormat.parse(fmt), {variant: VARIANTS[variant] for variant in missing})
                 for variant, figures in measured.items():
                     known[name, fmt, variant] = {"scene": name, "format": fmt, "variant": variant, **figures,
                                                  "version": version}

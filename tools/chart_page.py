@@ -5,7 +5,8 @@ from .page import filled_page, markdown_table
 
 __all__ = ["draw_charts", "filled"]
 
-_COLORS = {"separate": "#1f5fa8", "fused": "#2f8f4e", "truncated": "#c2571a", "reciprocal": "#8a5fb0"}
+_COLORS = {"separate": "#1f5fa8", "fused": "#2f8f4e", "truncated": "#c2571a", "reciprocal": "#8a5fb0",
+           "tolerant 2": "#9a9a3a", "tolerant 4": "#b0357a", "tolerant 8": "#50b0b0"}
 _PAPER = "7.16"
 _PANELS = {"wrong_percent": "pixels that show another triangle, %", "psnr": "PSNR of the picture, dB",
            "cracks": "cracks, pixels", "t_err_p999": "relative error of t, 99.9 %"}

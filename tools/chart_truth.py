@@ -38,17 +38,17 @@ class Truth:
         self.golden = render_golden(scene, camera, *size, shading="full", depth=DEPTH)
         self._around = np.stack([render(scene, camera, *size, shift=(x * _REACH, y * _REACH)).t for x, y in AROUND])
 
-    def measure(self, fmt, arithmetics):
-        """Figures of the model's pictures in a format, for each of ``arithmetics``, numbers by name.
+    def measure(self, fmt, variants):
+        """Figures of the model's pictures in a format, for each of ``variants``, parameters of a chip by name.
 
         Where a scene does not fit the format, there is its ``error`` alone.
         """
         try:
             image = CompiledScene(self._scene, fmt=fmt).image(self._scene, eye=self._camera.eye, is_full=True)
         except SceneError as error:
-            return {name: {"error": str(error)} for name in arithmetics}
+            return {name: {"error": str(error)} for name in variants}
         config = replace(ChipConfig(fmt=fmt), shader=replace(image.needs, depth=DEPTH))
-        return {name: self._figures(image, replace(config, arithmetic=number)) for name, number in arithmetics.items()}
+        return {name: self._figures(image, replace(config, **parameters)) for name, parameters in variants.items()}
 
     def _figures(self, image, config):
         try:
@@ -69,7 +69,7 @@ class Truth:
         part = np.quantile(error, (0.5, 0.999, 1.0)) if error.size else np.full(3, math.nan)
         counts = drawn.report["counts"]
         return {
-            "wrong_percent": round(100 * wrong.sum() / pixels, 4), "cracks": int((farther & ~known).sum()),
+            "wrong_percent": round(100 * float(wrong.mean()), 4), "cracks": int((farther & ~known).sum()),
             "phantoms": int((nearer & ~known).sum()),
             **{f"t_err_{name}": float(f"{value:.3g}") for name, value in zip(("median", "p999", "max"), part,
                                                                              strict=True)},

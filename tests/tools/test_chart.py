@@ -14,7 +14,7 @@ from sim.golden import render_golden
 from sim.scene import Camera, Material
 from tests.sim.golden.rooms import quad, scene_of
 from tools import chart_truth
-from tools.chart import chart
+from tools.chart import VARIANTS, chart
 from tools.chart_page import filled
 from tools.chart_truth import Truth
 
@@ -54,7 +54,7 @@ def changed(frame, column, *, instance, t):
 def test_faults(truth, monkeypatch, column, instance, t, wrong, cracks, phantoms):
     frame = changed(truth.golden, column, instance=instance, t=t)
     monkeypatch.setattr(chart_truth, "render_full", lambda *args, **options: frame)
-    found = truth.measure(FORMAT, {"separate": 0})["separate"]
+    found = truth.measure(FORMAT, {"separate": {}})["separate"]
     assert found["wrong_percent"] == round(100 * wrong / 192, 4)
     assert (found["cracks"], found["phantoms"]) == (cracks, phantoms)
     assert (found["steps_per_pixel"], found["triangle_tests_per_pixel"]) == (2.0, 1.0)
@@ -65,13 +65,14 @@ def test_error_of_t(truth, monkeypatch):
     frame.t *= 1 + 2.0 ** -12
     frame.t[5, 12] = 1 + 2.0 ** -11
     monkeypatch.setattr(chart_truth, "render_full", lambda *args, **options: frame)
-    found = truth.measure(FORMAT, {"separate": 0})["separate"]
+    found = truth.measure(FORMAT, {"separate": {}})["separate"]
     assert found["t_err_median"] == pytest.approx(2.0 ** -12, rel=1e-2)
     assert found["t_err_max"] == pytest.approx(2.0 ** -11, rel=1e-2)
 
 
 def test_the_model_itself(truth):
-    found = truth.measure(FloatFormat(8, 23), {"separate": 0, "fused": 1})
+    variants = {"separate": {}, "fused": {"arithmetic": 1}, "tolerant": {"edge_tolerance": 2}}
+    found = truth.measure(FloatFormat(8, 23), variants)
     for figures in found.values():
         assert (figures["wrong_percent"], figures["cracks"], figures["phantoms"]) == (0, 0, 0)
         assert figures["psnr"] > 45
@@ -81,7 +82,7 @@ def test_the_model_itself(truth):
 def test_a_scene_that_does_not_fit():
     tiny = quad([(0, 0, 0), (1e-7, 0, 0), (1e-7, 1, 0), (0, 1, 0)], Material("thin", (1.0, 1.0, 1.0)))
     scene = scene_of(tiny)
-    found = Truth(scene, scene.default_camera(), (4, 3)).measure(FloatFormat(5, 10), {"separate": 0})
+    found = Truth(scene, scene.default_camera(), (4, 3)).measure(FloatFormat(5, 10), {"separate": {}})
     message = ("nothing is left of the scene: no triangle has an area once its vertices are rounded to format 5.10; "
                "choose a format with more bits")
     assert found == {"separate": {"error": message}}
@@ -107,8 +108,8 @@ def test_the_command_goes_on_where_it_stopped(folder, monkeypatch):
     path = docs / "results" / "accuracy.json"
     rows = json.loads(path.read_text())["rows"]
     assert [(row["format"], row["variant"]) for row in rows] == [
-        (fmt, variant) for fmt in ("7.12", "7.16") for variant in ("separate", "fused", "truncated", "reciprocal")]
-    assert len(path.with_suffix(".csv").read_text().splitlines()) == 9
+        (fmt, variant) for fmt in ("7.12", "7.16") for variant in VARIANTS]
+    assert len(path.with_suffix(".csv").read_text().splitlines()) == 1 + 2 * len(VARIANTS)
     assert (docs / "pictures" / "chart-formats.png").stat().st_size > 10_000
     assert "| 7.16 |" in (docs / "accuracy.md").read_text()
     monkeypatch.setattr("tools.chart.Truth", lambda *args: pytest.fail("measured again"))
