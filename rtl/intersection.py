@@ -4,74 +4,13 @@ from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from fpu import Datapath, Delay, Vector
+from fpu import Delay
 
 from .arithmetic import ARITHMETICS
 from .layout import PACKET_RAYS, scale_layout, thread_width, token_layout, vector_layout, with_token
+from .unit_triangle import unit_triangle
 
 __all__ = ["Intersection", "hit_layout", "limits_layout", "unit_triangle"]
-
-
-#: No edge gives by more, in u and v: seen so exactly from its edge that t is lost, a triangle would reach out.
-MAX_TOLERANCE = 2.0**-6
-
-
-def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False, tolerant=False):
-    """t = −O′z / D′z, u = O′x + t·D′x, v = O′y + t·D′y; ``hit`` if 0 < t < ∞, u ≥ 0, v ≥ 0 and u + v ≤ 1.
-
-    ``nearer`` if t < t_hit, which comes in just in time, as late as t is known (paper §2.1.2). With ``near``
-    it is t_near < t instead of 0 < t.
-
-    With ``tolerant`` it is u > −ε_u, v > −ε_v, u + v < 1 + max(ε_u, ε_v), where ε_u = ``tolerance`` times
-
-        max(s(O′x), |t·D′x|·s(D′z)/|D′z|), at most :data:`MAX_TOLERANCE`
-
-    in powers of two; s, the ``scale`` of :func:`~rtl.affine_map.affine_map`, is the largest of the products that were
-    added up. What rounding them does to O′x is the first term; the second is what t does, which divides by D′z = D·N
-    and loses what that has lost, where a ray grazes. What is 0 or more is inside whatever ε is.
-
-    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator; if tolerant, a few
-    additions and comparisons of exponents.
-    """
-    dp = Datapath(fmt, latencies=latencies, **arithmetic.parameters)
-    origin, direction = dp.vector("origin"), dp.vector("direction")
-    t = dp.neg(dp.div(origin.z, direction.z))
-    t_hit = dp.input("t_hit", delay=dp.arrival(t))
-    u = dp.add(origin.x, dp.mul(t, direction.x))
-    v = dp.add(origin.y, dp.mul(t, direction.y))
-    inside = _tolerant(dp, t, u, v) if tolerant else dp.logical_and(
-        dp.logical_not(dp.is_negative(u)), dp.logical_not(dp.is_negative(v)), dp.is_at_most_one(dp.add(u, v)))
-    if near:
-        ahead = dp.logical_and(dp.is_finite(t), dp.lt(dp.input("t_near", delay=dp.arrival(t)), t))
-    else:
-        ahead = dp.logical_and(dp.is_finite(t), dp.logical_not(dp.sign(t)), dp.logical_not(dp.is_zero(t)))
-    dp.output("t", t)
-    dp.output("u", u)
-    dp.output("v", v)
-    dp.output("hit", dp.logical_and(ahead, inside))
-    dp.output("nearer", dp.lt(t, t_hit))
-    return dp
-
-
-def _tolerant(dp, t, u, v):
-    """Whether a point is inside of edges that give, see :func:`unit_triangle`."""
-    # Powers they are already; to say so again keeps their fractions out of the delays.
-    scale = {name: Vector(*map(dp.power, dp.vector(f"{name}_scale"))) for name in ("origin", "direction")}
-    direction = {axis: dp.inputs[f"direction_{axis}"] for axis in "xyz"}
-    loss = dp.power_div(scale["direction"].z, dp.power(direction["z"]))
-    errors = []
-    for axis in "xy":
-        way = dp.power(dp.mul(t, direction[axis]))
-        errors.append(dp.power_max(getattr(scale["origin"], axis), dp.power_mul(way, loss)))
-    # A constant that needs no registers
-    tolerance = dp.input("tolerance", delay=max(map(dp.arrival, errors)))
-    errors, most = [dp.power_mul(error, tolerance) for error in errors], dp.const(MAX_TOLERANCE)
-    inside = [dp.logical_or(dp.logical_not(dp.is_negative(value)),
-                            dp.logical_and(dp.is_within(value, error), dp.is_within(value, most)))
-              for value, error in zip((u, v), errors, strict=True)]
-    total = dp.add(u, v)
-    return dp.logical_and(*inside, dp.is_at_most_one_plus(total, dp.power_max(*errors)),
-                          dp.is_at_most_one_plus(total, most))
 
 
 def hit_layout(*, fmt, index_width):

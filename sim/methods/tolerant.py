@@ -2,39 +2,28 @@
 
 import math
 
-from fpu import Datapath, Vector
+from fpu import Datapath
+from rtl.affine_map import affine_map
+from rtl.unit_triangle import MAX_TOLERANCE, edge_errors, edge_scales, inside_edges
 
 from .method import Method
 from .parts import outputs
 from .unit_triangle import stored_matrix
 
-__all__ = ["BOUNDS", "CAP", "TOLERANCES", "scaled_map", "tolerant", "tolerant_test"]
+__all__ = ["BOUNDS", "TOLERANCES", "scaled_map", "tolerant", "tolerant_test"]
 
 #: k of the methods.
 TOLERANCES = (2, 4, 8, 16)
 #: What bounds the error of u, see :func:`tolerant_test`.
 BOUNDS = ("lean", "full", "products", "terms")
-#: No edge is wider, in u and v.
-CAP = 2.0**-6
 
 
-def scaled_map(fmt, *, latencies=None):
-    """The chip's m·(X − C), and for each row ``result_scale_x`` …: the power of two of the largest of its products.
-
-    Datapath: 9 adders, 9 multipliers; and six comparisons of exponents.
-    """
-    dp = Datapath(fmt, latencies=latencies)
-    is_point, vector, center = dp.flag("is_point"), dp.vector("vector"), dp.vector("center")
-    moved = [dp.sub(getattr(vector, axis), dp.select(is_point, getattr(center, axis), dp.const(0.0))) for axis in "xyz"]
-    for number, axis in enumerate("xyz"):
-        products = [dp.mul(a, b) for a, b in zip(dp.vector(f"row{number}"), moved, strict=True)]
-        dp.output(f"result_{axis}", dp.add(dp.add(products[0], products[1]), products[2]))
-        first, second, third = (dp.power(product) for product in products)
-        dp.output(f"result_scale_{axis}", dp.power_max(dp.power_max(first, second), third))
-    return dp
+def scaled_map(fmt):
+    """The chip's m·(X − C) with the scale of each row, see :func:`~rtl.affine_map.affine_map`."""
+    return affine_map(fmt, scaled=True)
 
 
-def tolerant_test(fmt, *, ulp, bound=BOUNDS[0], cap=CAP, latencies=None):
+def tolerant_test(fmt, *, ulp, bound=BOUNDS[0], cap=MAX_TOLERANCE, latencies=None):
     """The chip's test with u > −ε_u, v > −ε_v and u + v < 1 + max(ε_u, ε_v).
 
     ::
@@ -44,8 +33,8 @@ def tolerant_test(fmt, *, ulp, bound=BOUNDS[0], cap=CAP, latencies=None):
     where E, of powers of two alone, is by ``bound``
 
     ==========  =====================================================================================================
-    lean        max(s(O′x), |w|·s(D′z)/|D′z|): s is the largest of the products that were added up, so s(a)/|a| is
-                what a has lost to cancellation. D′z = D·N loses where the ray grazes, and t with it, and O′z alike
+    lean        max(s(O′x), |w|·s(D′z)/|D′z|), the chip's own: s is the largest of the products that were added up, so
+                s(a)/|a| is what a has lost to cancellation. D′z = D·N loses where the ray grazes, and O′z alike
     full        max(s(O′x), t·s(D′x), |w|·max(s(O′z)/|O′z|, s(D′z)/|D′z|))
     products    max(s(O′x), t·s(D′x))
     terms       max(|O′x|, |w|)
@@ -59,35 +48,32 @@ def tolerant_test(fmt, *, ulp, bound=BOUNDS[0], cap=CAP, latencies=None):
     """
     dp = Datapath(fmt, latencies=latencies)
     origin, direction = dp.vector("origin"), dp.vector("direction")
-    # Powers they are already; to say so again keeps their fractions out of the delays.
-    scale = {} if bound == "terms" else {
-        name: Vector(*map(dp.power, dp.vector(f"{name}_scale"))) for name in ("origin", "direction")}
+    scales = {} if bound == "terms" else edge_scales(dp)
     t = dp.neg(dp.div(origin.z, direction.z))
-    if bound in ("lean", "full"):
-        loss = dp.power_div(scale["direction"].z, dp.power(direction.z))
-    if bound == "full":
-        loss = dp.power_max(loss, dp.power_div(scale["origin"].z, dp.power(origin.z)))
-    values, errors = [], []
-    for axis in "xy":
-        start, way = getattr(origin, axis), dp.mul(t, getattr(direction, axis))
-        values.append(dp.add(start, way))
-        error = dp.power(start) if bound == "terms" else getattr(scale["origin"], axis)
-        if bound in ("full", "products"):
-            error = dp.power_max(error, dp.power_mul(dp.power(t), getattr(scale["direction"], axis)))
-        if bound == "terms":
-            error = dp.power_max(error, dp.power(way))
-        elif bound != "products":
-            error = dp.power_max(error, dp.power_mul(dp.power(way), loss))
-        errors.append(dp.power_mul(error, dp.const(ulp * 2.0**-fmt.frac_width)))
-    cap, sum_of = dp.const(cap), dp.add(*values)
-    inside = [dp.logical_or(dp.logical_not(dp.is_negative(value)),
-                            dp.logical_and(dp.is_within(value, error), dp.is_within(value, cap)))
-              for value, error in zip(values, errors, strict=True)]
-    inside += [dp.is_at_most_one_plus(sum_of, dp.power_max(*errors)), dp.is_at_most_one_plus(sum_of, cap)]
-    return outputs(dp, t, *values, dp.logical_and(*inside))
+    ways = [dp.mul(t, direction.x), dp.mul(t, direction.y)]
+    if bound == "lean":
+        errors = edge_errors(dp, t, direction, **scales)
+    elif bound == "terms":
+        errors = [dp.power_max(dp.power(start), dp.power(way)) for start, way in zip(origin, ways, strict=False)]
+    else:
+        errors = _errors_of_products(dp, t, origin, direction, ways, full=bound == "full", **scales)
+    errors = [dp.power_mul(error, dp.const(ulp * 2.0**-fmt.frac_width)) for error in errors]
+    u, v = (dp.add(start, way) for start, way in zip(origin, ways, strict=False))
+    return outputs(dp, t, u, v, inside_edges(dp, u, v, errors, most=cap))
 
 
-def tolerant(ulp, *, bound=BOUNDS[0], cap=CAP):
+def _errors_of_products(dp, t, origin, direction, ways, *, origin_scale, direction_scale, full):
+    errors = [dp.power_max(start, dp.power_mul(dp.power(t), way))
+              for start, way in ((origin_scale.x, direction_scale.x), (origin_scale.y, direction_scale.y))]
+    if full:
+        loss = dp.power_max(dp.power_div(direction_scale.z, dp.power(direction.z)),
+                            dp.power_div(origin_scale.z, dp.power(origin.z)))
+        errors = [dp.power_max(error, dp.power_mul(dp.power(way), loss))
+                  for error, way in zip(errors, ways, strict=True)]
+    return errors
+
+
+def tolerant(ulp, *, bound=BOUNDS[0], cap=MAX_TOLERANCE):
     """The method with a tolerance of ``ulp`` units in the last place.
 
     Raises

@@ -8,7 +8,7 @@ import pytest
 from fpu import FloatFormat
 from rtl.affine_map import affine_map
 from rtl.arithmetic import ARITHMETICS
-from rtl.intersection import MAX_TOLERANCE, unit_triangle
+from rtl.unit_triangle import MAX_TOLERANCE, unit_triangle
 
 FMT = FloatFormat(7, 16)
 COUNT = 3000
