@@ -1,10 +1,8 @@
 """``dynrt arithmetic``: what fused dot products, reciprocals, tables and truncation do to a chip and its pictures."""
 
-import json
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import click
 from rich.console import Console
@@ -21,9 +19,11 @@ from sim.golden import psnr, render_golden
 from sim.model import render_model
 from sim.scene.compile import CompiledScene
 
-from .errors import clear_errors, written_whole
+from .errors import clear_errors
+from .options import docs_option, scenes_option
 from .page import check_places, filled_page, markdown_table
 from .real_scenes import real_scenes
+from .results import json_text, write_texts
 
 __all__ = ["arithmetic"]
 
@@ -95,10 +95,8 @@ _PARTS = {"arithmetic": _page}
 
 
 @click.command()
-@click.option("--scenes", type=click.Path(exists=True, file_okay=False, path_type=Path), required=True,
-              help="Folder with the scenes and cameras.json")
-@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
-              show_default=True, help="Where fpu.md is, and results/arithmetic.json goes")
+@scenes_option
+@docs_option("Where fpu.md is, and results/arithmetic.json goes")
 @click.option("--seeds", type=click.IntRange(1), default=3, show_default=True, help="Placements of each datapath")
 @click.option("--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True,
               help="Runs of place and route at a time")
@@ -113,8 +111,5 @@ def arithmetic(scenes, docs, seeds, jobs):
                    "tools": versions(), "pictures": _pictures(scenes, console),
                    "datapaths": _areas(seeds, jobs, console)}
         (docs / "results").mkdir(exist_ok=True)
-        with written_whole(docs / "results" / "arithmetic.json") as whole:
-            whole.write_text(json.dumps(results, indent=1) + "\n")
-        text = filled_page(page, _PARTS, results)
-        with written_whole(page) as whole:
-            whole.write_text(text)
+        write_texts({docs / "results" / "arithmetic.json": json_text(results),
+                     page: filled_page(page, _PARTS, results)})

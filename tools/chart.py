@@ -2,7 +2,6 @@
 
 import csv
 import hashlib
-import json
 from pathlib import Path
 
 import click
@@ -14,7 +13,9 @@ from rtl.arithmetic import ARITHMETICS
 from .chart_page import draw_charts, filled
 from .chart_truth import Truth
 from .errors import clear_errors, written_whole
+from .options import docs_option, scenes_option
 from .real_scenes import SCENES, real_scenes
+from .results import earlier_results, json_text, write_texts
 
 __all__ = ["chart"]
 
@@ -39,10 +40,8 @@ def _version():
 
 
 @click.command()
-@click.option("--scenes", type=click.Path(exists=True, file_okay=False, path_type=Path), required=True,
-              help="Folder with the scenes and cameras.json")
-@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
-              show_default=True, help="Where accuracy.md is, and results/accuracy.json, .csv and pictures/ go")
+@scenes_option
+@docs_option("Where accuracy.md is, and results/accuracy.json, .csv and pictures/ go")
 @click.option("--only", multiple=True, type=click.Choice([name for name, _, _ in _SCENES]),
               help="Only this scene; the others keep their figures")
 @click.option("--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Only this format  [default: all]")
@@ -56,7 +55,7 @@ def chart(scenes, docs, only, formats):
     with clear_errors():
         # Before the long work
         filled(page, [])
-        rows = json.loads(path.read_text())["rows"] if path.exists() else []
+        rows = earlier_results(path).get("rows", [])
         known = {(row["scene"], row["format"], row["variant"]): row for row in rows}
         for name, scene, camera in real_scenes(scenes, only=only, scenes=_SCENES):
             truth = None
@@ -78,16 +77,13 @@ def chart(scenes, docs, only, formats):
                     for variant, figures in measured.items()), soft_wrap=True, markup=False)
         _write(path, rows)
         draw_charts(rows, docs / "pictures")
-        text = filled(page, rows)
-        with written_whole(page) as whole:
-            whole.write_text(text)
+        write_texts({page: filled(page, rows)})
 
 
 def _write(path, rows):
     for folder in (path.parent, path.parent.parent / "pictures"):
         folder.mkdir(exist_ok=True)
-    with written_whole(path) as whole:
-        whole.write_text(json.dumps({"size": list(SIZE), "rows": rows}, indent=1) + "\n")
+    write_texts({path: json_text({"size": list(SIZE), "rows": rows})})
     columns = list(dict.fromkeys(column for row in rows for column in row if column != "version"))
     with written_whole(path.with_suffix(".csv")) as whole, open(whole, "w", newline="") as file:
         table = csv.DictWriter(file, columns, extrasaction="ignore")

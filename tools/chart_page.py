@@ -1,6 +1,6 @@
 """Charts and tables of accuracy over formats."""
 
-from .errors import written_whole
+from .figure import drawn_figure
 from .page import filled_page, markdown_table
 
 __all__ = ["draw_charts", "filled"]
@@ -22,16 +22,16 @@ def _series(rows, scene, variant, column):
 
 def draw_charts(rows, folder):
     """Writes ``chart-formats.png``: a column for each scene, a row for each measure, formats across."""
-    # Here, because no other command needs it and it takes a while.
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     formats = list(dict.fromkeys(row["format"] for row in rows))
     if not rows:
         return
-    figure = Figure(figsize=(2.5 * len(scenes) + 0.6, 2.3 * len(_PANELS) + 0.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    size = 2.5 * len(scenes) + 0.6, 2.3 * len(_PANELS) + 0.6
+    with drawn_figure(folder / "chart-formats.png", figsize=size) as figure:
+        _draw(figure, rows, scenes, formats)
+
+
+def _draw(figure, rows, scenes, formats):
     grid = figure.subplots(len(_PANELS), len(scenes), sharex=True, sharey="row", squeeze=False)
     for line, (column, title) in zip(grid, _PANELS.items(), strict=True):
         line[0].set_ylabel(title, fontsize=8)
@@ -50,8 +50,6 @@ def draw_charts(rows, folder):
     for axes, scene in zip(grid[0], scenes, strict=True):
         axes.set_title(scene, fontsize=9)
     grid[0][0].legend(fontsize=7, frameon=False)
-    with written_whole(folder / "chart-formats.png") as path:
-        figure.savefig(path, format="png", dpi=110, metadata={"Software": None})
 
 
 def _cell(row):

@@ -10,13 +10,12 @@ from sim.golden import psnr, render_golden
 from sim.golden.tracer import render
 from sim.model import render_full
 from sim.scene import SceneError
-from sim.scene.compile import CompiledScene
 
+from .pipeline_demos import DEPTH, prepared
 from .sensitivity import AROUND, flip
 
 __all__ = ["Truth"]
 
-DEPTH = 4
 #: Relative distance within which two surfaces count as one.
 _SAME = 1e-3
 #: Part of a pixel within which golden's samples are moved to see what else it might show.
@@ -44,7 +43,7 @@ class Truth:
         Where a scene does not fit the format, there is its ``error`` alone.
         """
         try:
-            image = CompiledScene(self._scene, fmt=fmt).image(self._scene, eye=self._camera.eye, is_full=True)
+            image = prepared(self._scene, self._camera, fmt=fmt)
         except SceneError as error:
             return {name: {"error": str(error)} for name in variants}
         config = replace(ChipConfig(fmt=fmt), shader=replace(image.needs, depth=DEPTH))

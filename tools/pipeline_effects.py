@@ -12,7 +12,7 @@ from sim.machine import render_rtl
 from sim.model import render_full
 from sim.scene.effects import effect_scenes
 
-from .errors import written_whole
+from .figure import drawn_figure
 from .pipeline_demos import DEPTH, FORMAT, NUDGE, prepared
 from .sensitivity import MovedPictures, flip
 
@@ -66,22 +66,15 @@ def effect_rows(path, console):
                          MovedPictures(scene, camera, _SIZE, depth=DEPTH).psnr(golden.color, NUDGE), 2),
                      "flip": round(flip(golden.color, model.color), 4)})
         console.print(f"{name}: {drawn.report['cycles']:,} cycles", highlight=False)
-    with written_whole(path) as target:
-        _sheet(pairs).savefig(target, format="png", dpi=100, metadata={"Software": None})
+    num_rows = -(-len(pairs) // _COLUMNS)
+    with drawn_figure(path, dpi=100, figsize=(2.2 * _COLUMNS, 3.6 * num_rows)) as figure:
+        _sheet(figure, pairs, num_rows)
     return rows
 
 
-def _sheet(pairs):
-    # Here, because no other command needs it and it takes a while.
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    num_rows = -(-len(pairs) // _COLUMNS)
-    figure = Figure(figsize=(2.2 * _COLUMNS, 3.6 * num_rows), layout="constrained")
-    FigureCanvasAgg(figure)
+def _sheet(figure, pairs, num_rows):
     for place, axes in zip(pairs, figure.subplots(num_rows, _COLUMNS).flat, strict=False):
         axes.imshow(np.concatenate(pairs[place]), interpolation="nearest")
         axes.set_title(place, fontsize=9)
     for axes in figure.axes:
         axes.axis("off")
-    return figure

@@ -3,7 +3,6 @@
 import json
 import os
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import click
 from rich.console import Console
@@ -14,9 +13,10 @@ from sim.stability.cases import CASES, limits_of
 from sim.stability.truth import BLUR
 
 from .costs import measured_luts
-from .errors import BadInput, clear_errors, written_whole
-from .options import FORMAT
+from .errors import BadInput, clear_errors
+from .options import FORMAT, docs_option
 from .page import check_places, filled_page
+from .results import write_texts
 from .stability_page import PARTS
 from .stability_plots import draw_plots
 
@@ -80,8 +80,7 @@ def _methods(fmt, luts):
 
 
 @click.command()
-@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), default=Path("docs"),
-              show_default=True, help="Where accuracy.md is, and results/stability.json and pictures/ go")
+@docs_option("Where accuracy.md is, and results/stability.json and pictures/ go")
 @click.option("--only", type=click.Choice(list(CASES)), multiple=True, metavar="CASE",
               help=f"Measure this case, keep the others: {', '.join(CASES)}  [default: all]")
 @click.option("--rays", type=click.IntRange(16), default=_NUM_RAYS, show_default=True,
@@ -117,9 +116,7 @@ def stability(docs, only, rays, fmt, jobs):
         for folder in (path.parent, docs / "pictures"):
             folder.mkdir(exist_ok=True)
         draw_plots(results, docs / "pictures")
-        for target, content in ((path, _json(results)), (page, text)):
-            with written_whole(target) as whole:
-                whole.write_text(content)
+        write_texts({path: _json(results), page: text})
 
 
 def _known(path, fmt):

@@ -4,7 +4,7 @@ import numpy as np
 
 from sim.stability.cases import CASES
 
-from .errors import written_whole
+from .figure import drawn_figure
 from .stability_page import SHOWN, rates
 
 __all__ = ["draw_plots"]
@@ -24,16 +24,9 @@ def draw_plots(results, folder):
     folder : Path
         Where to.
     """
-    # Here, because few commands need it and it takes a while.
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     for name, draw in (("stability", _map), ("stability-sweeps", _sweeps)):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
-        draw(figure, results)
-        with written_whole(folder / f"{name}.png") as path:
-            figure.savefig(path, format="png", dpi=110, metadata={"Software": None})
+        with drawn_figure(folder / f"{name}.png") as figure:
+            draw(figure, results)
 
 
 def _map(figure, results):
