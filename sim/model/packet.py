@@ -19,19 +19,22 @@ _STEPS, _LEAVES, _ENTRIES, VECTORS, _TESTS, _INSTANCES, _POPS, _DEPTH = range(8)
 
 
 @compiled()
+def _operands(matrix, vector):
+    """A vector and a matrix as the maps take them."""
+    return (vector[0], vector[1], vector[2], matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[0, 0], matrix[0, 1],
+            matrix[0, 2], matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[2, 0], matrix[2, 1], matrix[2, 2])
+
+
+@compiled()
 def transform(arithmetic, params, matrix, vector, is_point):
     """A vector by a matrix float64[4, 3] of three rows and C, see :func:`rtl.transformation.affine_map`."""
-    return affine_map(arithmetic, params, is_point, vector[0], vector[1], vector[2],
-                      matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[0, 0], matrix[0, 1], matrix[0, 2],
-                      matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[2, 0], matrix[2, 1], matrix[2, 2])
+    return affine_map(arithmetic, params, is_point, *_operands(matrix, vector))
 
 
 @compiled()
 def _transform_scaled(arithmetic, params, matrix, vector, is_point):
     """As :func:`transform`, and behind it the scale of each row."""
-    return scaled_map(arithmetic, params, is_point, vector[0], vector[1], vector[2],
-                      matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[0, 0], matrix[0, 1], matrix[0, 2],
-                      matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[2, 0], matrix[2, 1], matrix[2, 2])
+    return scaled_map(arithmetic, params, is_point, *_operands(matrix, vector))
 
 
 @compiled()

@@ -9,6 +9,7 @@ import pytest
 from fpu import FloatFormat
 from sim.methods.plucker import plucker_test
 from sim.methods.projection import projection_test
+from tests.triangles import aimed_rays
 from tools.costs import COLUMNS, cost_tables, measured_luts
 from tools.designs import ray_shader
 
@@ -26,23 +27,7 @@ def named(name, array):
 
 @pytest.fixture(scope="module")
 def rays():
-    """Rays towards triangles, half of them hitting, and what Cramer's rule says of them in float64."""
-    rng = np.random.default_rng(5)
-    corners = FMT.quantize(rng.uniform(-1, 1, (COUNT, 3, 3)))
-    origin = FMT.quantize(rng.uniform(-3, 3, (COUNT, 3)))
-    weights = rng.dirichlet((1, 1, 1), COUNT) + rng.uniform(-0.4, 0.4, (COUNT, 3))
-    target = np.einsum("ni,nij->nj", weights / weights.sum(axis=1, keepdims=True), corners)
-    direction = FMT.quantize((target - origin) * rng.choice((-1, 1), (COUNT, 1), p=(0.2, 0.8)))
-    edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    t, u, v = np.linalg.solve(np.stack([-direction, *edges], axis=2), (origin - corners[:, 0])[..., None])[..., 0].T
-    inside = (t > 0) & (u >= 0) & (v >= 0) & (u + v <= 1)
-    # Nearly edge-on or thin triangles and rays at an edge may go either way.
-    normal = np.cross(*edges)
-    steep = np.abs((normal * direction).sum(axis=1)) / np.linalg.norm(direction, axis=1) > 0.1
-    clear = steep & (np.abs(np.stack([t, u, v, 1 - u - v])).min(axis=0) > 1e-3)
-    assert 0.2 < inside[clear].mean() < 0.7
-    assert clear.mean() > 0.5
-    return corners, origin, direction, (t, u, v, inside), clear
+    return aimed_rays(FMT, COUNT)
 
 
 def judged(results, rays, t_hit):

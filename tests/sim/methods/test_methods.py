@@ -10,6 +10,7 @@ from sim.methods import METHODS, closest_hits, near_pairs
 from sim.methods.closest import Pairs
 from sim.methods.method import built
 from sim.methods.tolerant import scaled_map, tolerant
+from tests.triangles import aimed_rays
 
 FINE, FMT = FloatFormat(8, 23), FloatFormat(7, 16)
 COUNT = 4000
@@ -17,22 +18,7 @@ COUNT = 4000
 
 @pytest.fixture(scope="module")
 def rays():
-    """Rays towards triangles, half of them hitting, and what Cramer's rule says of them in float64."""
-    rng = np.random.default_rng(5)
-    corners = FINE.quantize(rng.uniform(-1, 1, (COUNT, 3, 3)))
-    origin = FINE.quantize(rng.uniform(-3, 3, (COUNT, 3)))
-    weights = rng.dirichlet((1, 1, 1), COUNT) + rng.uniform(-0.4, 0.4, (COUNT, 3))
-    target = np.einsum("ni,nij->nj", weights / weights.sum(axis=1, keepdims=True), corners)
-    direction = FINE.quantize((target - origin) * rng.choice((-1, 1), (COUNT, 1), p=(0.2, 0.8)))
-    edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    t, u, v = np.linalg.solve(np.stack([-direction, *edges], axis=2), (origin - corners[:, 0])[..., None])[..., 0].T
-    inside = (t > 0) & (u >= 0) & (v >= 0) & (u + v <= 1)
-    normal = np.cross(*edges)
-    steep = np.abs((normal * direction).sum(axis=1)) / np.linalg.norm(direction, axis=1) > 0.1
-    clear = steep & (np.abs(np.stack([t, u, v, 1 - u - v])).min(axis=0) > 1e-3)
-    assert 0.2 < inside[clear].mean() < 0.7
-    assert clear.mean() > 0.5
-    return corners, origin, direction, (t, u, v, inside), clear
+    return aimed_rays(FINE, COUNT)
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
