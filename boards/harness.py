@@ -2,7 +2,7 @@
 
 import re
 
-from amaranth.hdl import ClockSignal, Instance, Module, Signal, Value
+from amaranth.hdl import ClockSignal, Const, Instance, Module, Signal, Value
 from amaranth.lib.wiring import In
 
 __all__ = ["between_registers", "is_of_harness"]
@@ -48,7 +48,8 @@ def between_registers(component):
     for path, member, member_value in component.signature.flatten(component):
         name = "_".join(map(str, path))
         value = Value.cast(member_value)
-        if not len(value):
+        # A stream that is always ready has a constant in place of ready.
+        if not len(value) or isinstance(value, Const):
             continue
         if member.flow is In:
             port = Signal(len(value), name=name)

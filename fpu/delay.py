@@ -22,6 +22,8 @@ class Delay(wiring.Component):
     memory_from : int or None
         Cycles from which on a memory is used, at least 2. By default 5, and 17 for less than four bits, where a memory
         of ECP5, 16 deep and 4 wide, and its counter save nothing.
+    registered : bool
+        Whether what comes out of a memory comes out of flip-flops behind it, at the beginning of its cycle.
 
     Members
     -------
@@ -36,7 +38,7 @@ class Delay(wiring.Component):
         If ``cycles`` is negative or ``memory_from`` is less than 2.
     """
 
-    def __init__(self, shape, *, cycles, memory_from=None):
+    def __init__(self, shape, *, cycles, memory_from=None, registered=False):
         if cycles < 0:
             raise ValueError(f"Delay must not be negative, but is {cycles!r} cycles")
         if memory_from is None:
@@ -45,6 +47,7 @@ class Delay(wiring.Component):
             raise ValueError(f"A memory delays by at least 2 cycles, not {memory_from!r}")
         self.cycles = cycles
         self._uses_memory = cycles >= memory_from
+        self._registered = registered
         super().__init__({"i": In(shape), "o": Out(shape)})
 
     def elaborate(self, platform):
@@ -61,15 +64,21 @@ class Delay(wiring.Component):
         return m
 
     def _remember(self, m):
-        m.submodules.memory = ring = memory.Memory(
-            shape=Shape.cast(self.i.shape()), depth=self.cycles, init=[])
-        write, read = ring.write_port(), ring.read_port()
-        position = Signal(range(self.cycles), reset_less=True)
+        depth = self.cycles - self._registered
+        m.submodules.memory = ring = memory.Memory(shape=Shape.cast(self.i.shape()), depth=depth, init=[])
+        write, read = ring.write_port(), ring.read_port(domain="comb" if self._registered else "sync")
+        position = Signal(range(depth), reset_less=True)
         following = Signal.like(position)
         m.d.comb += [
-            following.eq(Mux(position == self.cycles - 1, 0, position + 1)),
+            following.eq(Mux(position == depth - 1, 0, position + 1)),
             write.addr.eq(position), write.data.eq(self.i), write.en.eq(1),
-            # The oldest value, to be replaced in the next cycle: never the one being written.
-            read.addr.eq(following), self.o.eq(read.data),
         ]
         m.d.sync += position.eq(following)
+        if self._registered:
+            # The oldest value, while it is being replaced.
+            oldest = Signal.like(Value.cast(self.o), name="oldest", reset_less=True)
+            m.d.comb += [read.addr.eq(position), Value.cast(self.o).eq(oldest)]
+            m.d.sync += oldest.eq(read.data)
+        else:
+            # The oldest value, to be replaced in the next cycle: never the one being written.
+            m.d.comb += [read.addr.eq(following), self.o.eq(read.data)]

@@ -1,10 +1,11 @@
 """A direct-mapped cache that goes on serving hits while lines are being fetched."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal
-from amaranth.lib import data, memory, stream, wiring
+from amaranth.hdl import Assert, Cat, Const, Module, Mux, Signal
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import exact_log2
 
+from .block_memory import BlockMemory
 from .queue import Queue
 
 __all__ = ["WORD_WIDTH", "Cache"]
@@ -12,16 +13,18 @@ __all__ = ["WORD_WIDTH", "Cache"]
 #: Bits of a memory word.
 WORD_WIDTH = 32
 
-_ANSWERS_DEPTH = 8
+# Of requests that look up, and of their answers until they are taken
+_NUM_LOOKUPS = 9
 
 
 class Cache(wiring.Component):
     """Answers item numbers with items; answers to different requests may overtake each other.
 
-    A request that finds its line is answered after 4 cycles, one a clock. One that does not waits in a queue;
+    A request that finds its line is answered after 5 cycles, one a clock. One that does not waits in a queue;
     the head of that queue fetches its line, or, when that line is on its way or has just come, waits for it
-    and looks again. Whoever fetches a line is answered by the line itself, and whoever looked again in vain
-    fetches: two threads that evict each other's lines cannot do so forever.
+    and looks again. Whoever fetches a line is the first to look when it has come, and whoever looked again in vain
+    fetches: two threads that evict each other's lines cannot do so forever. A line that comes takes the place of
+    two lookups.
 
     Items lie in memory back to back, each in a whole number of 32-bit words, least significant first.
 
@@ -49,6 +52,11 @@ class Cache(wiring.Component):
     flush : forget all lines; to be held until ``flushed``, while no request is in the cache
     flushed : every line is forgotten
     hit, miss : a request has found, has not found its line
+
+    Raises
+    ------
+    ValueError
+        If a line is a single word.
     """
 
     def __init__(self, *, item_width, payload_shape, index_width, num_lines, line_items=1, num_fetches=4,
@@ -59,7 +67,11 @@ class Cache(wiring.Component):
         self._line_items = line_items
         self._num_fetches = num_fetches
         self._num_waiting = num_waiting
+        if self.line_words < 2:
+            raise ValueError("A line of a cache has a single word; it must have 2 or more")
+        self._slot_bits = exact_log2(num_lines)
         self._line_width = index_width - exact_log2(line_items)
+        self._tag = data.StructLayout({"valid": 1, "tag": self._line_width - self._slot_bits})
         self._request_layout = data.StructLayout({"index": index_width, "payload": payload_shape})
         self._response_layout = data.StructLayout({"item": item_width, "payload": payload_shape})
         super().__init__({
@@ -78,6 +90,9 @@ class Cache(wiring.Component):
         """Memory words in a line."""
         return self._item_words * self._line_items
 
+    def _line(self, request):
+        return request.index[exact_log2(self._line_items):]
+
     def _select_item(self, line, index):
         stride = self._item_words * WORD_WIDTH
         items = [line[k * stride:k * stride + self._item_width] for k in range(self._line_items)]
@@ -87,162 +102,155 @@ class Cache(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        item_bits = exact_log2(self._line_items)
-        slot_bits = exact_log2(self._num_lines)
-        line_bits = self.line_words * WORD_WIDTH
-        tag_layout = data.StructLayout({"valid": 1, "tag": self._line_width - slot_bits})
-        waiting_layout = data.StructLayout({"request": self._request_layout, "in_vain": 1})
+        request_layout = self._request_layout
+        m.submodules.tags = tags = BlockMemory(self._tag, depth=self._num_lines)
+        m.submodules.lines = lines = BlockMemory(self.line_words * WORD_WIDTH, depth=self._num_lines)
+        # So that whoever asks does not wait within a cycle for who it is that looks.
+        m.submodules.requests = requests = Queue(request_layout, depth=2)
+        wiring.connect(m, wiring.flipped(self.request), requests.i)
+        # Answers that there are, and those that lookups and lines on their way may become.
+        max_promised = _NUM_LOOKUPS + self._num_fetches
+        promised = Signal(range(max_promised + 1))
+        claims, starts, vain, answered = Signal(), Signal(), Signal(), Signal()
+        m.d.comb += answered.eq(self.response.valid & self.response.ready)
+        m.d.sync += promised.eq(promised + (starts + claims) - (answered + vain))
 
-        m.submodules.tags = tags = memory.Memory(shape=tag_layout, depth=self._num_lines, init=[])
-        m.submodules.lines = lines = memory.Memory(shape=line_bits, depth=self._num_lines, init=[])
-        tag_read, line_read = tags.read_port(), lines.read_port()
-        tag_write, line_write = tags.write_port(), lines.write_port()
+        # Lookup: whoever has fetched goes first, then one that waits, then a new one; nobody while a line is written.
+        owner, owner_looks = Signal(request_layout, reset_less=True), Signal()
+        head, again = Signal(request_layout, reset_less=True), Signal()
+        comes, allowed = Signal(), Signal()
+        first = Signal(request_layout)
+        m.d.comb += [
+            # A fetch needs an answer too, and lookups leave it one.
+            allowed.eq((promised < max_promised - 1) & ~comes & ~owner_looks),
+            starts.eq(allowed & (again | requests.o.valid)),
+            requests.o.ready.eq(allowed & ~again),
+            first.eq(Mux(owner_looks, owner, Mux(again, head, requests.o.payload))),
+        ]
+        about_layout = data.StructLayout({"valid": 1, "repeated": 1, "owns": 1})
+        about = [Signal(about_layout, name=f"about{stage}") for stage in range(4)]
+        looking = [Signal(request_layout, name=f"looking{stage}", reset_less=True) for stage in range(4)]
+        m.d.comb += [
+            about[0].valid.eq(starts | owner_looks),
+            about[0].repeated.eq(again | owner_looks),
+            about[0].owns.eq(owner_looks),
+            looking[0].eq(first),
+        ]
+        for stage in range(3):
+            m.d.sync += [about[stage + 1].eq(about[stage]), looking[stage + 1].eq(looking[stage])]
+        for rows in (tags, lines):
+            m.d.comb += [rows.reading.eq(about[0].valid), rows.address.eq(self._line(first)[:self._slot_bits])]
+        compared, found, item = looking[2], Signal(), Signal(self._item_width, reset_less=True)
+        m.d.sync += [
+            found.eq(about[2].owns | tags.data.valid & (tags.data.tag == self._line(compared)[self._slot_bits:])),
+            item.eq(self._select_item(lines.data, compared.index)),
+        ]
+
+        m.submodules.answers = answers = Queue(self._response_layout, depth=max_promised, always_ready=True,
+                                               block=False)
+        waiting_layout = data.StructLayout({"request": request_layout, "in_vain": 1})
         m.submodules.waiting = waiting = Queue(waiting_layout, depth=self._num_waiting, always_ready=True)
-        m.submodules.owners = owners = Queue(self._request_layout, depth=self._num_fetches, always_ready=True)
-        m.submodules.filled = filled = Queue(self._response_layout, depth=self._num_fetches, always_ready=True)
-        m.submodules.answers = answers = Queue(self._response_layout, depth=_ANSWERS_DEPTH, always_ready=True)
         wiring.connect(m, answers.o, wiring.flipped(self.response))
-        head, has_head = Signal(waiting_layout, reset_less=True), Signal()
-
-        # Lookup: a waiting request that shall look again goes before a new one.
-        requests = [Signal(self._request_layout, name=f"lookup{stage}", reset_less=stage > 0) for stage in range(3)]
-        valid = [Signal(name=f"lookup_valid{stage}") for stage in range(3)]
-        repeated = [Signal(name=f"lookup_repeated{stage}", reset_less=stage > 0) for stage in range(3)]
-        again = Signal()
-        room = Signal()
-        yielding = [Signal(name=f"lookup_yields{stage}") for stage in range(3)]
-        promised = Signal(range(_ANSWERS_DEPTH + 3))
         m.d.comb += [
-            # Any lookup under way may become an answer. A filled line takes its turn when the lookup has no
-            # answer; so that there is such a cycle for each, a lookup is left out.
-            promised.eq(answers.level + valid[1] + valid[2]),
-            yielding[0].eq(filled.level > yielding[1] + yielding[2]),
-            room.eq((promised < _ANSWERS_DEPTH - 1) & ~yielding[0]),
-            requests[0].eq(Mux(again, head.request, self.request.payload)),
-            repeated[0].eq(again),
-            valid[0].eq(room & (again | self.request.valid)),
-            self.request.ready.eq(room & ~again),
-            tag_read.addr.eq(requests[0].index[item_bits:][:slot_bits]),
-            line_read.addr.eq(requests[0].index[item_bits:][:slot_bits]),
+            vain.eq(about[3].valid & ~found),
+            self.hit.eq(about[3].valid & found & ~about[3].repeated),
+            self.miss.eq(vain & ~about[3].repeated),
+            answers.i.valid.eq(about[3].valid & found),
+            answers.i.payload.item.eq(item),
+            answers.i.payload.payload.eq(looking[3].payload),
+            waiting.i.valid.eq(vain),
+            waiting.i.payload.request.eq(looking[3]),
+            waiting.i.payload.in_vain.eq(about[3].repeated),
         ]
-        for stage in (1, 2):
-            m.d.sync += [
-                requests[stage].eq(requests[stage - 1]),
-                valid[stage].eq(valid[stage - 1]),
-                repeated[stage].eq(repeated[stage - 1]),
-                yielding[stage].eq(yielding[stage - 1]),
-            ]
-        # A second register after the memories: block RAM is slow from clock to output.
-        tag = Signal(tag_layout, reset_less=True)
-        line = Signal(line_bits, reset_less=True)
-        m.d.sync += [tag.eq(tag_read.data), line.eq(line_read.data)]
+        issue = self._decide(m, waiting.o, head=head, again=again, again_starts=again & allowed, claims=claims,
+                             may_claim=promised < max_promised, comes=comes)
+        self._fill(m, tags, lines, head=head, issue=issue, owner=owner, owner_looks=owner_looks, comes=comes)
+        return m
 
-        looked_up = requests[2]
-        found = Signal()
-        answer_found = Signal()
-        answer_filled = Signal()
-        m.d.comb += [
-            found.eq(tag.valid & (tag.tag == looked_up.index[item_bits + slot_bits:])),
-            self.hit.eq(valid[2] & found & ~repeated[2]),
-            self.miss.eq(valid[2] & ~found & ~repeated[2]),
-            waiting.i.payload.request.eq(looked_up),
-            waiting.i.payload.in_vain.eq(repeated[2]),
-            waiting.i.valid.eq(valid[2] & ~found),
-            answer_found.eq(valid[2] & found),
-            answer_filled.eq(filled.o.valid & ~answer_found & (promised < _ANSWERS_DEPTH)),
-            filled.o.ready.eq(answer_filled),
-            answers.i.valid.eq(answer_found | answer_filled),
-            answers.i.payload.eq(filled.o.payload),
-        ]
-        with m.If(answer_found):
-            m.d.comb += [
-                answers.i.payload.item.eq(self._select_item(line, looked_up.index)),
-                answers.i.payload.payload.eq(looked_up.payload),
-            ]
-
+    def _decide(self, m, waiting, *, head, again, again_starts, claims, may_claim, comes):
+        """Who waits longest: whether it may look again, or is to fetch. Returns when it does."""
         # Fetches, a ring in order of issue: those on their way, then those that came, the last one longest ago.
         fetch_layout = data.StructLayout({"line": self._line_width, "known": 1, "busy": 1})
         fetches = [Signal(fetch_layout, name=f"fetch{k}") for k in range(self._num_fetches)]
-        newest = Signal(range(self._num_fetches))
-        oldest = Signal(range(self._num_fetches))
-        head_line, next_line = Signal(self._line_width), Signal(self._line_width)
-        # Of the head, and of what comes next, whose line each fetch is.
-        same, same_next = Signal(self._num_fetches), Signal(self._num_fetches)
-        busy = Signal(self._num_fetches)
-        on_its_way = Signal()
-        free = Signal()
-        issue, done = Signal(), Signal()
+        newest, oldest = Signal(range(self._num_fetches)), Signal(range(self._num_fetches))
+        has_head, in_vain = Signal(), Signal(reset_less=True)
+        same = Signal(self._num_fetches)
+        on_its_way, has_come, free = Signal(), Signal(), Signal()
+        fetch = Signal()
+        issue = Signal()
         m.d.comb += [
-            head_line.eq(head.request.index[item_bits:]),
-            next_line.eq(waiting.o.payload.request.index[item_bits:]),
-            busy.eq(Cat(fetch.busy for fetch in fetches)),
-            on_its_way.eq((same & busy).any()),
-            # A filled line that still waits for its turn keeps its place, or ``filled`` might overflow.
-            free.eq(owners.level + filled.level < self._num_fetches),
-            again.eq(has_head & same.any() & ~on_its_way & ~head.in_vain),
-            self.line_request.valid.eq(has_head & ~on_its_way & (~same.any() | head.in_vain) & free),
-            self.line_request.payload.eq(head_line),
-            issue.eq(self.line_request.valid & self.line_request.ready),
-            owners.i.payload.eq(head.request),
-            owners.i.valid.eq(issue),
-            done.eq(issue | again & room),
-            waiting.o.ready.eq(~has_head | done),
+            on_its_way.eq((same & Cat(place.busy for place in fetches)).any()),
+            has_come.eq(same.any() & ~in_vain),
+            free.eq(~Cat(place.busy for place in fetches).all()),
+            claims.eq(has_head & ~on_its_way & ~has_come & free & may_claim & ~fetch),
+            self.line_request.valid.eq(fetch),
+            self.line_request.payload.eq(self._line(head)),
+            issue.eq(fetch & self.line_request.ready),
+            waiting.ready.eq(~has_head),
         ]
-        # The head is compared before it gets there: from a queue through all fetches to who may send is a long way.
-        with m.If(waiting.o.ready):
-            m.d.sync += [head.eq(waiting.o.payload), has_head.eq(waiting.o.valid), same.eq(same_next)]
-        line_words = self.line_words
-        complete = Signal(line_bits)
-        gathered = Signal(line_bits, reset_less=True)
-        count = Signal(range(line_words))
-        last = Signal()
-        m.d.comb += [
-            # The newest word comes on top of those before it.
-            complete.eq(Cat(gathered, self.line_data.payload)[WORD_WIDTH:]),
-            last.eq(self.line_data.valid & (count == line_words - 1)),
+        # One step of the way to a decision a cycle: none is urgent, as the line takes many.
+        with m.If(~has_head):
+            m.d.sync += [
+                head.eq(waiting.payload.request),
+                in_vain.eq(waiting.payload.in_vain),
+                has_head.eq(waiting.valid),
+                same.eq(Cat(place.known & (place.line == self._line(waiting.payload.request)) for place in fetches)),
+            ]
+        with m.If(issue | again_starts):
+            m.d.sync += has_head.eq(0)
+        m.d.sync += [
+            again.eq(has_head & ~on_its_way & has_come & ~again_starts),
+            fetch.eq(claims | fetch & ~issue),
         ]
-        with m.If(self.line_data.valid):
-            m.d.sync += [gathered.eq(complete), count.eq(Mux(last, 0, count + 1))]
-        for number, fetch in enumerate(fetches):
-            with m.If(last & (oldest == number)):
-                m.d.sync += fetch.busy.eq(0)
-            m.d.comb += same_next[number].eq(fetch.known & (fetch.line == next_line))
+        for number, place in enumerate(fetches):
+            with m.If(comes & (oldest == number)):
+                m.d.sync += place.busy.eq(0)
             with m.If(issue & (newest == number)):
-                m.d.comb += same_next[number].eq(head_line == next_line)
-                m.d.sync += [fetch.line.eq(head_line), fetch.known.eq(1), fetch.busy.eq(1)]
+                m.d.sync += [place.line.eq(self._line(head)), place.known.eq(1), place.busy.eq(1)]
             with m.If(self.flush):
-                m.d.sync += fetch.known.eq(0)
-        with m.If(issue):
-            m.d.sync += newest.eq(Mux(newest == self._num_fetches - 1, 0, newest + 1))
-        with m.If(last):
-            m.d.sync += oldest.eq(Mux(oldest == self._num_fetches - 1, 0, oldest + 1))
+                m.d.sync += place.known.eq(0)
+        for number, moves in ((newest, issue), (oldest, comes)):
+            with m.If(moves):
+                m.d.sync += number.eq(Mux(number == self._num_fetches - 1, 0, number + 1))
+        return issue
 
-        owner = owners.o.payload
-        owner_line = Signal(self._line_width)
+    def _fill(self, m, tags, lines, *, head, issue, owner, owner_looks, comes):
+        """Gathers a line's words and writes it a cycle after the last."""
+        m.submodules.owners = owners = Queue(self._request_layout, depth=self._num_fetches, always_ready=True)
+        line_bits = self.line_words * WORD_WIDTH
+        gathered = Signal(line_bits, reset_less=True)
+        count = Signal(range(self.line_words))
+        last = Signal()
+        line = self._line(owners.o.payload)
         m.d.comb += [
-            owner_line.eq(owner.index[item_bits:]),
-            owners.o.ready.eq(last),
-            filled.i.valid.eq(last),
-            filled.i.payload.item.eq(self._select_item(complete, owner.index)),
-            filled.i.payload.payload.eq(owner.payload),
-            line_write.addr.eq(owner_line[:slot_bits]),
-            line_write.data.eq(complete),
-            line_write.en.eq(last),
-            tag_write.addr.eq(owner_line[:slot_bits]),
-            tag_write.data.valid.eq(1),
-            tag_write.data.tag.eq(owner_line[slot_bits:]),
-            tag_write.en.eq(last),
+            owners.i.payload.eq(head),
+            owners.i.valid.eq(issue),
+            owners.o.ready.eq(comes),
+            last.eq(self.line_data.valid & (count == self.line_words - 1)),
+            lines.write.valid.eq(comes),
+            lines.write.address.eq(line[:self._slot_bits]),
+            lines.write.data.eq(gathered),
+            tags.write.valid.eq(comes),
+            tags.write.address.eq(line[:self._slot_bits]),
+            tags.write.data.valid.eq(1),
+            tags.write.data.tag.eq(line[self._slot_bits:]),
         ]
+        m.d.sync += [comes.eq(last), owner_looks.eq(comes), owner.eq(owners.o.payload),
+                     Assert(~comes | owners.o.valid, "a line comes that nobody has asked for")]
+        with m.If(self.line_data.valid):
+            # The newest word comes on top of those before it.
+            m.d.sync += [gathered.eq(Cat(gathered, self.line_data.payload)[WORD_WIDTH:]),
+                         count.eq(Mux(last, 0, count + 1))]
 
         flush_slot = Signal(range(self._num_lines + 1))
-        m.d.comb += self.flushed.eq(flush_slot == self._num_lines)
+        cleared, clears = Signal(range(self._num_lines)), Signal()
+        at_end = Signal()
+        m.d.comb += [at_end.eq(flush_slot == self._num_lines), self.flushed.eq(at_end & ~clears)]
+        m.d.sync += [clears.eq(self.flush & ~at_end), cleared.eq(flush_slot)]
         with m.If(~self.flush):
             m.d.sync += flush_slot.eq(0)
-        with m.Elif(~self.flushed):
-            m.d.comb += [
-                tag_write.addr.eq(flush_slot),
-                tag_write.data.eq(Const(0, len(tag_write.data.as_value()))),
-                tag_write.en.eq(1),
-            ]
+        with m.Elif(~at_end):
             m.d.sync += flush_slot.eq(flush_slot + 1)
-        return m
+        with m.If(clears):
+            m.d.comb += [tags.write.valid.eq(1), tags.write.address.eq(cleared),
+                         tags.write.data.eq(Const(0, self._tag.size))]

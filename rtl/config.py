@@ -66,7 +66,7 @@ class ChipConfig:
     add_latency: int = 6
     mul_latency: int = 3
     div_latency: int = 14
-    cmp_latency: int = 1
+    cmp_latency: int = 2
     num_threads: int = 64
     stack_depth: int = 32
     mailbox_entries: int = 4

@@ -146,6 +146,7 @@ class DynRTP(wiring.Component):
             store.step_address.eq(traversal.step_address),
             traversal.step_rays.eq(store.step_rays),
             stack.push.eq(traversal.push),
+            stack.popping.eq(traversal.popping),
             stack.popped_address.eq(traversal.popped_address),
             traversal.popped_intervals.eq(stack.popped_intervals),
             intersection.hit_address.eq(stack.hit_address),
@@ -240,7 +241,7 @@ class DynRTP(wiring.Component):
 
         pops = merged(m, "pop_merge", [
             self._queue(m, "nowhere", traversal.pop, self._token),
-            self._queue(m, "list_end", mailboxed_list.pop, self._token),
+            mailboxed_list.pop,
         ])
         wiring.connect(m, pops, stack.pop)
 

@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from fpu import Delay
 
 from .arithmetic import ARITHMETICS
+from .block_memory import BlockMemory
 from .layout import PACKET_RAYS, scale_layout, thread_width, token_layout, vector_layout, with_token
 from .unit_triangle import unit_triangle
 
@@ -120,14 +121,16 @@ class Intersection(wiring.Component):
         if self._tolerance:
             self._scale(m, test, vector)
 
-        # The distance to beat has its address two cycles before it is wanted.
+        # A cycle after the test it is decided whether the hit counts; the distance to beat has its address two cycles
+        # before it is wanted.
+        latency = graph.latency + 1
         beside_layout = data.StructLayout({"token": self._token, "ray": range(PACKET_RAYS), "first": 1, "last": 1,
                                            "index": self._index_width, "cosine": self._fmt,
                                            "solid": int(self._limited)})
         ask_at = graph.inputs["t_hit"].start - 2
         m.submodules.to_ask = to_ask = Delay(beside_layout, cycles=ask_at)
-        m.submodules.to_end = to_end = Delay(beside_layout, cycles=graph.latency - ask_at)
-        valid = Signal(graph.latency + 1)
+        m.submodules.to_end = to_end = Delay(beside_layout, cycles=latency - ask_at, registered=True)
+        valid = Signal(latency + 1)
         m.d.comb += [
             to_ask.i.token.eq(vector.token),
             to_ask.i.ray.eq(vector.ray),
@@ -140,16 +143,16 @@ class Intersection(wiring.Component):
             valid[0].eq(taken),
         ]
         m.d.sync += valid[1:].eq(valid[:-1])
-        m.submodules.distances = distances = memory.Memory(
-            shape=self._fmt, depth=PACKET_RAYS * num_slots, init=[])
-        distance_read, distance_write = distances.read_port(), distances.write_port()
-        distance = Signal(self._fmt, reset_less=True)
+        m.submodules.distances = distances = BlockMemory(self._fmt, depth=PACKET_RAYS * num_slots)
         m.d.comb += [
-            distance_read.addr.eq(Cat(to_ask.o.ray, to_ask.o.token.thread)),
-            test.t_hit.eq(distance),
+            distances.reading.eq(valid[ask_at]),
+            distances.address.eq(Cat(to_ask.o.ray, to_ask.o.token.thread)),
+            test.t_hit.eq(distances.data),
         ]
-        m.d.sync += distance.eq(distance_read.data)
 
+        found = Signal(data.StructLayout({"hit": 1, "nearer": 1, "t": self._fmt, "u": self._fmt, "v": self._fmt}),
+                       reset_less=True)
+        m.d.sync += [found[name].eq(getattr(test, name)) for name in ("hit", "nearer", "t", "u", "v")]
         done = to_end.o
         before = Signal(PACKET_RAYS)
         now = Signal(PACKET_RAYS)
@@ -157,7 +160,7 @@ class Intersection(wiring.Component):
         better = Signal()
         allowed, is_over = Signal(init=1), Signal()
         m.d.comb += [
-            better.eq(valid[-1] & test.hit & allowed & (test.nearer | ~done.token.hit.bit_select(done.ray, 1))),
+            better.eq(valid[-1] & found.hit & allowed & (found.nearer | ~done.token.hit.bit_select(done.ray, 1))),
             before.eq(Mux(done.first, done.token.hit, hits_so_far)),
             now.eq(before | (better << done.ray)),
             self.tested.payload.eq(done.token),
@@ -173,7 +176,7 @@ class Intersection(wiring.Component):
         new = Signal(data.StructLayout({"valid": 1, "thread": done.token.thread.shape(), "ray": range(PACKET_RAYS),
                                         "t": self._fmt}))
         m.d.comb += [new.valid.eq(better), new.thread.eq(done.token.thread), new.ray.eq(done.ray),
-                     new.t.eq(Mux(is_over, self._fmt.const(0.0), test.t))]
+                     new.t.eq(Mux(is_over, self._fmt.const(0.0), found.t))]
         m.submodules.records = records = memory.Memory(shape=self._record, depth=PACKET_RAYS * num_slots, init=[])
         record_write = records.write_port()
         m.d.comb += [
@@ -181,13 +184,13 @@ class Intersection(wiring.Component):
             entered_write.data.eq(self.entered.index),
             entered_write.en.eq(self.entered.valid),
             instance_read.addr.eq(done.token.thread),
-            distance_write.addr.eq(Cat(new.ray, new.thread)),
-            distance_write.data.eq(new.t),
-            distance_write.en.eq(new.valid),
+            distances.write.valid.eq(new.valid),
+            distances.write.address.eq(Cat(new.ray, new.thread)),
+            distances.write.data.eq(new.t),
             record_write.addr.eq(Cat(new.ray, new.thread)),
             record_write.data.t.eq(new.t),
-            record_write.data.u.eq(test.u),
-            record_write.data.v.eq(test.v),
+            record_write.data.u.eq(found.u),
+            record_write.data.v.eq(found.v),
             record_write.data.cosine.eq(done.cosine),
             record_write.data.triangle.eq(done.index),
             record_write.data.instance.eq(instance_read.data),
@@ -220,7 +223,7 @@ class Intersection(wiring.Component):
                              new.t.eq(self.limit.payload.t_far),
                              record_write.data.triangle.eq(~0)]
             m.d.comb += self.limit.ready.eq(~better)
-            self._limit(m, test, to_ask.o, to_end.o, cycles=graph.latency - ask_at, instances=instances,
+            self._limit(m, test, to_ask.o, to_end.o, cycles=latency - ask_at, instances=instances,
                         allowed=allowed, is_over=is_over)
         return m
 
@@ -257,7 +260,8 @@ class Intersection(wiring.Component):
         m.d.sync += limit.eq(read.data)
         if self._near:
             m.d.comb += test.t_near.eq(limit.t_near)
-        m.submodules.verdict = verdict = Delay(data.StructLayout({"excluded": 1, "any_hit": 1}), cycles=cycles - 2)
+        m.submodules.verdict = verdict = Delay(data.StructLayout({"excluded": 1, "any_hit": 1}), cycles=cycles - 2,
+                                               registered=True)
         m.d.comb += [
             verdict.i.excluded.eq((limit.triangle == asked.o.triangle) & (limit.instance == asked.o.instance)),
             verdict.i.any_hit.eq(limit.any_hit),

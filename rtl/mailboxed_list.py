@@ -1,9 +1,12 @@
 """The mailboxed list: what stands in a leaf, less what the packet has already been tested against."""
 
+from itertools import pairwise
+
 from amaranth.hdl import Cat, Module, Mux, Signal
-from amaranth.lib import data, memory, stream, wiring
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from .block_memory import BlockMemory
 from .layout import PACKET_RAYS, job_layout, list_entry_layout, thread_width, token_layout, with_token
 from .queue import Merge, Queue
 
@@ -19,7 +22,7 @@ class MailboxedList(wiring.Component):
     the leaf, so once is enough. Each level has a mailbox; the one of the instances' triangles is emptied when
     an instance is entered, the one of the scene when the thread begins anew.
 
-    An entry takes one cycle; the job for it follows in the next.
+    An entry takes one cycle, an instance's two; the job for it follows 4 cycles later.
 
     Parameters
     ----------
@@ -30,7 +33,8 @@ class MailboxedList(wiring.Component):
 
     Members
     -------
-    begin : ``{"valid", "thread"}``: the thread begins a new packet
+    begin : ``{"valid", "thread"}``: the thread begins a new packet, whose first entry comes 4 cycles later at the
+        earliest
     leaf : stream of ``{"token", "list"}``: a leaf to walk
     tested, left : streams of tokens: the job of the thread's last triangle is done; the instance has been left.
         Of such a token only thread, level and hits count
@@ -49,6 +53,9 @@ class MailboxedList(wiring.Component):
         self._mailbox_entries = mailbox_entries
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         self._place = with_token(token, list=index_width)
+        self._entry = list_entry_layout(index_width=index_width)
+        # Where in a list a token is, and whether that was its last entry
+        self._stop = with_token(token, list=index_width, last=1)
         super().__init__({
             "begin": In(data.StructLayout({"valid": 1, "thread": thread_width(num_threads)})),
             "leaf": In(stream.Signature(self._place)),
@@ -57,129 +64,151 @@ class MailboxedList(wiring.Component):
             "fetch": Out(stream.Signature(data.StructLayout({"index": index_width, "payload": self._place}))),
             "entry": In(stream.Signature(data.StructLayout({"item": 32, "payload": self._place}))),
             "job": Out(stream.Signature(job_layout(token, index_width=index_width, solid=solid), always_ready=True)),
-            "pop": Out(stream.Signature(token, always_ready=True)),
+            "pop": Out(stream.Signature(token)),
             "busy": Out(1),
         })
 
-    def _mailbox(self, m, level, *, thread, index, mask, post, clear, clear_thread):
-        """The mailbox of one level: the rays of ``mask`` that have been tested; ``post`` adds the others."""
-        letter_layout = data.StructLayout({"index": self._index_width, "rays": PACKET_RAYS})
-        count = self._mailbox_entries
-        box_layout = data.StructLayout({"letters": data.ArrayLayout(letter_layout, count), "next": range(count)})
-        m.submodules[f"mailboxes{level}"] = mailboxes = memory.Memory(
-            shape=box_layout, depth=1 << thread_width(self._num_threads), init=[])
-        read, write = mailboxes.read_port(domain="comb"), mailboxes.write_port()
-        found = Signal(count, name=f"found{level}")
-        tested = Signal(PACKET_RAYS, name=f"tested{level}")
-        box = read.data
-        m.d.comb += [
-            read.addr.eq(thread),
-            write.addr.eq(Mux(clear, clear_thread, thread)),
-            write.en.eq(post | clear),
-        ]
-        for number in range(count):
-            letter = box.letters[number]
-            # A letter without rays is an empty place.
-            m.d.comb += found[number].eq((letter.index == index) & letter.rays.any())
-            with m.If(found[number]):
-                m.d.comb += tested.eq(letter.rays)
-        with m.If(~clear):
-            m.d.comb += write.data.eq(box)
-            for number in range(count):
-                put = Signal(name=f"put{level}_{number}")
-                m.d.comb += put.eq(Mux(found.any(), found[number], box.next == number))
-                with m.If(put):
-                    m.d.comb += [
-                        write.data.letters[number].index.eq(index),
-                        write.data.letters[number].rays.eq(tested | mask),
-                    ]
-            with m.If(~found.any()):
-                m.d.comb += write.data.next.eq(Mux(box.next == count - 1, 0, box.next + 1))
-        return tested
-
     def elaborate(self, platform):
         m = Module()
-        context_layout = with_token(self._token, list=self._index_width, last=1)
-        m.submodules.contexts = contexts = memory.Memory(
-            shape=context_layout, depth=2 << thread_width(self._num_threads), init=[])
+        m.submodules.returned = returned = Queue(self._stop, depth=self._num_threads, always_ready=True)
+        m.submodules.skipped = skipped = Queue(self._stop, depth=self._num_threads, always_ready=True)
+        self._go_on(m, [returned.o, skipped.o])
+        contexts = self._come_back(m, returned.i)
+        entry, wanted, looks_at = self._look(m, contexts)
+        stop = skipped.i.payload
+        m.d.comb += [
+            self.job.valid.eq(looks_at & wanted.any()),
+            self.job.payload.token.eq(entry.token),
+            self.job.payload.token.mask.eq(wanted),
+            self.job.payload.index.eq(entry.item.index),
+            self.job.payload.instance.eq(entry.item.instance),
+            self.job.payload.solid.eq(entry.item.solid),
+            skipped.i.valid.eq(looks_at & ~wanted.any()),
+            stop.token.eq(entry.token),
+            stop.list.eq(entry.following),
+            stop.last.eq(entry.item.last),
+        ]
+        return m
 
-        # Tokens that come back find in memory where in which list they were.
+    def _go_on(self, m, stops):
+        """Fetches a list's next entry, or hands on a token whose list is at its end."""
+        # A list goes on before another is begun: what is in the caches is used first.
+        m.submodules.going_on = going_on = Merge(self._stop, num_inputs=len(stops) + 1)
+        m.submodules.ended = ended = Queue(self._token, depth=2)
+        for source, target in zip(stops, going_on.i, strict=False):
+            wiring.connect(m, source, target)
+        leaf, place = going_on.i[-1], going_on.o.payload
+        wiring.connect(m, ended.o, wiring.flipped(self.pop))
+        m.d.comb += [
+            leaf.valid.eq(self.leaf.valid),
+            leaf.payload.token.eq(self.leaf.payload.token),
+            leaf.payload.list.eq(self.leaf.payload.list),
+            self.leaf.ready.eq(leaf.ready),
+            self.fetch.valid.eq(going_on.o.valid & ~place.last),
+            self.fetch.payload.index.eq(place.list),
+            self.fetch.payload.payload.token.eq(place.token),
+            self.fetch.payload.payload.list.eq(place.list),
+            ended.i.valid.eq(going_on.o.valid & place.last),
+            ended.i.payload.eq(place.token),
+            going_on.o.ready.eq(Mux(place.last, ended.i.ready, self.fetch.ready)),
+        ]
+
+    def _come_back(self, m, returned):
+        """Tokens that come back find in memory where in which list they were; returns that memory."""
+        m.submodules.contexts = contexts = BlockMemory(self._stop, depth=2 << thread_width(self._num_threads))
         m.submodules.back = back = Merge(self._token, num_inputs=2)
         wiring.connect(m, wiring.flipped(self.tested), back.i[0])
         wiring.connect(m, wiring.flipped(self.left), back.i[1])
-        context_read, context_write = contexts.read_port(), contexts.write_port()
-        returning = Signal()
-        returned = Signal(self._token, reset_less=True)
-        place = Signal(self._token)
-        m.submodules.next_entry = next_entry = Queue(self._place, depth=self._num_threads, always_ready=True)
-        context = context_read.data
+        token = back.o.payload
+        hits = [Signal(PACKET_RAYS, name=f"hit{stage}", reset_less=True) for stage in range(contexts.latency + 1)]
+        comes = Signal(contexts.latency + 1)
         m.d.comb += [
             back.o.ready.eq(1),
-            context_read.addr.eq(Cat(back.o.payload.level, back.o.payload.thread)),
-            place.eq(context.token),
-            place.hit.eq(returned.hit),
-            next_entry.i.payload.token.eq(place),
-            next_entry.i.payload.list.eq(context.list),
-            next_entry.i.valid.eq(returning & ~context.last),
+            hits[0].eq(token.hit),
+            comes[0].eq(back.o.valid),
+            contexts.reading.eq(back.o.valid),
+            contexts.address.eq(Cat(token.level, token.thread)),
+            returned.valid.eq(comes[-1]),
+            returned.payload.eq(contexts.data),
+            returned.payload.token.hit.eq(hits[-1]),
         ]
-        m.d.sync += [returning.eq(back.o.valid), returned.eq(back.o.payload)]
+        m.d.sync += comes[1:].eq(comes[:-1])
+        for earlier, later in pairwise(hits):
+            m.d.sync += later.eq(earlier)
+        return contexts
 
-        # A list goes on before another is begun: what is in the caches is used first.
-        m.submodules.going_on = going_on = Merge(self._place, num_inputs=3)
-        m.submodules.skipped = skipped = Queue(self._place, depth=self._num_threads, always_ready=True)
-        wiring.connect(m, next_entry.o, going_on.i[0])
-        wiring.connect(m, skipped.o, going_on.i[1])
-        wiring.connect(m, wiring.flipped(self.leaf), going_on.i[2])
+    def _look(self, m, contexts):
+        """Looks each entry up in the mailbox; returns it, its rays to be tested, and when there is one."""
+        layout = with_token(self._token, item=self._entry, following=self._index_width)
+        entries = [Signal(layout, name=f"entry{stage}", reset_less=stage > 0) for stage in range(5)]
+        looking, clearing = Signal(5), Signal(4)
+        first, token = entries[0], self.entry.payload.payload.token
+        # An instance's triangles are forgotten in the cycle after its entry, in which no other is looked at.
+        pending, pending_thread = Signal(), Signal.like(token.thread, reset_less=True)
         m.d.comb += [
-            self.fetch.valid.eq(going_on.o.valid),
-            self.fetch.payload.index.eq(going_on.o.payload.list),
-            self.fetch.payload.payload.eq(going_on.o.payload),
-            going_on.o.ready.eq(self.fetch.ready),
+            self.entry.ready.eq(~self.begin.valid & ~pending),
+            looking[0].eq(self.entry.valid & self.entry.ready),
+            self.busy.eq(looking[0]),
+            clearing[0].eq(self.begin.valid | pending),
+            first.item.eq(self.entry.payload.item),
+            first.following.eq(self.entry.payload.payload.list + 1),
+            first.token.eq(token),
+            contexts.write.valid.eq(looking[0]),
+            contexts.write.address.eq(Cat(token.level, token.thread)),
+            contexts.write.data.token.eq(token),
+            contexts.write.data.list.eq(first.following),
+            contexts.write.data.last.eq(first.item.last),
         ]
+        with m.If(clearing[0]):
+            m.d.comb += [first.token.level.eq(~self.begin.valid),
+                         first.token.thread.eq(Mux(self.begin.valid, self.begin.thread, pending_thread))]
+        with m.If(~self.begin.valid):
+            m.d.sync += pending.eq(looking[0] & first.item.instance)
+        with m.If(looking[0]):
+            m.d.sync += pending_thread.eq(token.thread)
+        m.d.sync += [looking[1:].eq(looking[:-1]), clearing[1:].eq(clearing[:-1])]
+        for earlier, later in pairwise(entries):
+            m.d.sync += later.eq(earlier)
 
-        token = self.entry.payload.payload.token
-        following = Signal(self._index_width)
-        entry = Signal(list_entry_layout(index_width=self._index_width))
-        # A list's end after a skipped entry has to share ``pop`` with one after a test, and a look into the mailbox
-        # the write port with its emptying; in both cases the entry waits.
-        m.d.comb += [
-            entry.eq(self.entry.payload.item),
-            following.eq(self.entry.payload.payload.list + 1),
-            self.entry.ready.eq(~(returning & context.last) & ~self.begin.valid),
-        ]
-        looking = Signal()
-        m.d.comb += [looking.eq(self.entry.valid & self.entry.ready), self.busy.eq(looking)]
-        wanted = Signal(PACKET_RAYS)
-        m.d.comb += wanted.eq(token.mask)
+        tested = Signal(PACKET_RAYS)
         if self._mailbox_entries:
-            common = dict(thread=token.thread, index=entry.index, mask=token.mask)
-            in_scene = self._mailbox(m, 0, **common, post=looking & ~token.level, clear=self.begin.valid,
-                                     clear_thread=self.begin.thread)
-            # Only the scene's own list has instances, so this never clears what is posted at the same time.
-            in_instance = self._mailbox(m, 1, **common, post=looking & token.level,
-                                        clear=looking & entry.instance, clear_thread=token.thread)
-            m.d.comb += wanted.eq(token.mask & ~Mux(token.level, in_instance, in_scene))
+            self._mailbox(m, entries, tested, looking=looking, clearing=clearing)
+        wanted = Signal(PACKET_RAYS, reset_less=True)
+        m.d.sync += wanted.eq(entries[3].token.mask & ~tested)
+        return entries[4], wanted, looking[4]
+
+    def _mailbox(self, m, entries, tested, *, looking, clearing):
+        """The mailboxes of all threads and both levels: which rays have been tested; the others are added."""
+        letter_layout = data.StructLayout({"index": self._index_width, "rays": PACKET_RAYS})
+        count = self._mailbox_entries
+        box_layout = data.StructLayout({"letters": data.ArrayLayout(letter_layout, count), "next": range(count)})
+        m.submodules.mailboxes = mailboxes = BlockMemory(box_layout, depth=2 << thread_width(self._num_threads))
+        box = Signal(box_layout, reset_less=True)
+        found = Signal(count, reset_less=True)
+        asking, compared, entry = entries[0], entries[2], entries[3]
+        write = mailboxes.write
         m.d.comb += [
-            context_write.addr.eq(Cat(token.level, token.thread)),
-            context_write.data.token.eq(token),
-            context_write.data.list.eq(following),
-            context_write.data.last.eq(entry.last),
-            context_write.en.eq(looking),
-            skipped.i.payload.token.eq(token),
-            skipped.i.payload.list.eq(following),
-            skipped.i.valid.eq(looking & ~wanted.any() & ~entry.last),
-            self.pop.payload.eq(Mux(returning & context.last, place, token)),
-            self.pop.valid.eq(returning & context.last | looking & ~wanted.any() & entry.last),
+            mailboxes.reading.eq(looking[0]),
+            mailboxes.address.eq(Cat(asking.token.level, asking.token.thread)),
+            write.valid.eq(looking[3] | clearing[3]),
+            write.address.eq(Cat(entry.token.level, entry.token.thread)),
         ]
-        job = Signal.like(self.job.payload, name="job_q", reset_less=True)
-        job_valid = Signal()
-        m.d.sync += [
-            job.token.eq(token),
-            job.token.mask.eq(wanted),
-            job.index.eq(entry.index),
-            job.instance.eq(entry.instance),
-            job.solid.eq(entry.solid),
-            job_valid.eq(looking & wanted.any()),
-        ]
-        m.d.comb += [self.job.payload.eq(job), self.job.valid.eq(job_valid)]
-        return m
+        m.d.sync += box.eq(mailboxes.data)
+        for number in range(count):
+            letter = mailboxes.data.letters[number]
+            # A letter without rays is an empty place.
+            m.d.sync += found[number].eq((letter.index == compared.item.index) & letter.rays.any())
+            with m.If(found[number]):
+                m.d.comb += tested.eq(box.letters[number].rays)
+        with m.If(~clearing[3]):
+            m.d.comb += write.data.eq(box)
+            for number in range(count):
+                put = Signal(name=f"put{number}")
+                m.d.comb += put.eq(Mux(found.any(), found[number], box.next == number))
+                with m.If(put):
+                    m.d.comb += [
+                        write.data.letters[number].index.eq(entry.item.index),
+                        write.data.letters[number].rays.eq(tested | entry.token.mask),
+                    ]
+            with m.If(~found.any()):
+                m.d.comb += write.data.next.eq(Mux(box.next == count - 1, 0, box.next + 1))

@@ -1,14 +1,22 @@
 """Queues and the merging of streams."""
 
 from amaranth.hdl import Assert, Module, Mux, Shape, Signal
-from amaranth.lib import fifo, stream, wiring
+from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
+
+from .block_memory import BlockMemory
 
 __all__ = ["Merge", "Queue", "merged"]
 
+#: Elements in a distributed memory of ECP5.
+_DISTRIBUTED_DEPTH = 16
+
 
 class Queue(wiring.Component):
-    """First in, first out; an element written in one cycle can be read in the next.
+    """First in, first out, with its oldest element in a register.
+
+    What is written to an empty queue can be read in the next cycle. One element a cycle goes in and one comes out;
+    from block RAM, a cycle may pass without one before an element that found only one other there.
 
     Parameters
     ----------
@@ -19,6 +27,8 @@ class Queue(wiring.Component):
     always_ready : bool
         The writer does not look at ``ready``, having other grounds to know that there is room: a token queue
         as deep as there are threads, say. That it is right is asserted in simulation.
+    block : bool or None
+        Whether block RAM keeps them; by default if they are more than the 16 of a distributed memory.
 
     Members
     -------
@@ -26,9 +36,10 @@ class Queue(wiring.Component):
     level : elements held
     """
 
-    def __init__(self, shape, *, depth, always_ready=False):
+    def __init__(self, shape, *, depth, always_ready=False, block=None):
         self._width = Shape.cast(shape).width
         self._depth = depth
+        self._block = depth > _DISTRIBUTED_DEPTH + 1 if block is None else block
         super().__init__({
             "i": In(stream.Signature(shape, always_ready=always_ready)),
             "o": Out(stream.Signature(shape)),
@@ -37,20 +48,87 @@ class Queue(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.fifo = queue = fifo.SyncFIFO(width=self._width, depth=self._depth)
+        head, has_head = Signal(self._width, reset_less=True), Signal()
+        accepted, taken, free = Signal(), Signal(), Signal()
+        room = Signal(init=1)
+        level = Signal.like(self.level)
         m.d.comb += [
-            queue.w_data.eq(self.i.payload),
-            queue.w_en.eq(self.i.valid),
-            self.o.payload.eq(queue.r_data),
-            self.o.valid.eq(queue.r_rdy),
-            queue.r_en.eq(self.o.ready),
-            self.level.eq(queue.level),
+            self.o.payload.eq(head),
+            self.o.valid.eq(has_head),
+            accepted.eq(self.i.valid & self.i.ready),
+            taken.eq(has_head & self.o.ready),
+            free.eq(~has_head | self.o.ready),
+            level.eq(self.level + accepted - taken),
         ]
+        m.d.sync += [self.level.eq(level), room.eq(level != self._depth)]
         if self.i.signature.always_ready:
-            m.d.sync += Assert(~self.i.valid | queue.w_rdy, "a queue overflows")
+            m.d.sync += Assert(~self.i.valid | room, "a queue overflows")
         else:
-            m.d.comb += self.i.ready.eq(queue.w_rdy)
+            m.d.comb += self.i.ready.eq(room)
+
+        # Behind the head: what is next, and whether it and others are there.
+        following, has_following, has_others = Signal(self._width), Signal(), Signal()
+        stored = Signal()
+        m.d.comb += stored.eq(accepted & ~(free & ~has_others))
+        with m.If(free):
+            m.d.sync += [has_head.eq(has_following | accepted & ~has_others),
+                         head.eq(Mux(has_others, following, self.i.payload))]
+        if self._block:
+            self._keep_in_block(m, stored, free, following, has_following, has_others)
+        elif self._depth > 1:
+            self._keep(m, stored, free, following, has_following, has_others)
         return m
+
+    def _keep(self, m, stored, free, following, has_following, has_others):
+        depth = self._depth - 1
+        m.submodules.storage = storage = memory.Memory(shape=self._width, depth=depth, init=[])
+        read, write = storage.read_port(domain="comb"), storage.write_port()
+        fetched = Signal()
+        first, last, some = self._places(m, stored=stored, fetched=fetched, depth=depth)
+        m.d.comb += [
+            write.addr.eq(last),
+            write.data.eq(self.i.payload),
+            write.en.eq(stored),
+            read.addr.eq(first),
+            following.eq(read.data),
+            has_following.eq(some),
+            has_others.eq(some),
+            fetched.eq(some & free),
+        ]
+
+    def _keep_in_block(self, m, stored, free, following, has_following, has_others):
+        m.submodules.storage = storage = BlockMemory(self._width, depth=self._depth, registered=False)
+        fetched = Signal()
+        # What has been asked for is at the memory's output, and no longer among those between the places.
+        first, last, some = self._places(m, stored=stored, fetched=fetched, depth=self._depth)
+        m.d.comb += [
+            storage.write.valid.eq(stored),
+            storage.write.address.eq(last),
+            storage.write.data.eq(self.i.payload),
+            storage.address.eq(first),
+            storage.reading.eq(fetched),
+            following.eq(storage.data),
+            has_others.eq(has_following | some),
+            fetched.eq(some & (free | ~has_following)),
+        ]
+        m.d.sync += has_following.eq(fetched | has_following & ~free)
+
+    @staticmethod
+    def _places(m, *, stored, fetched, depth):
+        """Where the first is, where the next goes, and whether there are any.
+
+        What comes late, whether one is stored or fetched, does little more than enable registers.
+        """
+        first, second, last = Signal(range(depth)), Signal(range(depth), init=1 % depth), Signal(range(depth))
+        for place, moves in ((last, stored), (second, fetched)):
+            with m.If(moves):
+                m.d.sync += place.eq(Mux(place == depth - 1, 0, place + 1))
+        with m.If(fetched):
+            m.d.sync += first.eq(second)
+        # Many a bit is selected by it, so it comes from a register. With one place, the first is always the last one.
+        some = Signal()
+        m.d.sync += some.eq(stored | some & ~(fetched & (second == last)))
+        return first, last, some
 
 
 class Merge(wiring.Component):

@@ -102,9 +102,16 @@ class Transformation(wiring.Component):
         else:
             wiring.connect(m, wiring.flipped(self.step), jobs.step)
             m.d.comb += jobs.shared.eq(self.shared)
-        m.d.comb += [self.vector_address.eq(jobs.vector_address), self.entered.eq(jobs.entered),
-                     self.busy.eq(jobs.valid)]
-        self._map(m, jobs.vector, jobs.valid)
+        m.d.comb += [self.entered.eq(jobs.entered), self.busy.eq(jobs.valid)]
+        # Whose turn it is takes a while to find out.
+        given, active = Signal.like(jobs.vector, name="given", reset_less=True), Signal()
+        address = Signal.like(jobs.vector_address, name="address", reset_less=True)
+        m.d.sync += [given.eq(jobs.vector), address.eq(jobs.vector_address), active.eq(jobs.valid)]
+        if self._tag is None:
+            ray = jobs.vector.about.ray
+            m.d.sync += [given.x.eq(jobs.vector.x + 2 * ray[0]), given.y.eq(jobs.vector.y - 2 * ray[1])]
+        m.d.comb += self.vector_address.eq(address)
+        self._map(m, given, active)
         return m
 
     def _map(self, m, given, active):
@@ -134,7 +141,7 @@ class Transformation(wiring.Component):
                 *(getattr(mapping, f"row{row}_{axis}").eq(getattr(to_map.o.matrix.rows[row], axis))
                   for row in range(3)),
             ]
-        m.submodules.about = about = Delay(about_layout, cycles=mapping.latency)
+        m.submodules.about = about = Delay(about_layout, cycles=mapping.latency, registered=True)
         valid = Signal(read_latency + mapping.latency + 1)
         m.d.comb += [about.i.eq(to_map.o.about), valid[0].eq(active)]
         m.d.sync += valid[1:].eq(valid[:-1])
@@ -185,8 +192,8 @@ class Transformation(wiring.Component):
 
     def _screen(self, m, given, *, latency):
         """x and y of a primary ray become floats while stored vectors are read."""
-        screen, ray = [], given.about.ray
-        for name, value in (("x", given.x + 2 * ray[0]), ("y", given.y - 2 * ray[1])):
+        screen = []
+        for name, value in (("x", given.x), ("y", given.y)):
             convert = IntToFloat(self._fmt, int_width=self._half_width, signed=True, latency=latency)
             m.submodules[f"screen_{name}"] = convert
             m.d.comb += convert.i.eq(value)

@@ -1,12 +1,13 @@
 """Traversal: one kd-tree step for four rays a clock."""
 
 from amaranth.hdl import Module, Mux, Signal
-from amaranth.lib import data, memory, stream, wiring
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from fpu import Datapath, Delay
 
 from .arithmetic import ARITHMETICS
+from .block_memory import BlockMemory
 from .layout import (
     PACKET_RAYS,
     Axis,
@@ -85,7 +86,7 @@ class Traversal(wiring.Component):
     pop : stream of tokens: nothing more to visit from here
     push : what goes onto the stack
     step_address, step_rays : to and from the :class:`~rtl.ray_store.RayStore`
-    popped_address, popped_intervals : to and from the :class:`~rtl.stack.TraversalStack`
+    popping, popped_address, popped_intervals : to and from the :class:`~rtl.stack.TraversalStack`
     busy : a step begins
     """
 
@@ -109,6 +110,7 @@ class Traversal(wiring.Component):
                                            "intervals": self._intervals})),
             "step_address": Out(store["step_address"]),
             "step_rays": In(store["step_rays"]),
+            "popping": Out(1),
             "popped_address": Out(thread_width(num_threads)),
             "popped_intervals": In(self._intervals),
             "busy": Out(1),
@@ -119,8 +121,10 @@ class Traversal(wiring.Component):
         graph = kd_step(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic)
         steps = [graph.component() for _ in range(PACKET_RAYS)]
         read_latency = RayStore.read_latency
-        # The interval's address goes out so much before the interval is wanted, as the rays' did before them.
-        fetch_at = graph.inputs["t_near"].start
+        # The interval's address goes out so much before the interval is wanted, as the rays' did before them, and a
+        # cycle earlier if it can, for which of the intervals it is.
+        fetch_at = max(graph.inputs["t_near"].start - 1, 0)
+        select_latency = graph.inputs["t_near"].start - fetch_at
 
         token = self.node.payload.payload
         node = Signal(self._node)
@@ -143,9 +147,9 @@ class Traversal(wiring.Component):
         m.d.comb += split.i.eq(node.split)
         where_layout = data.StructLayout({"token": self._token, "child": node.child.shape(),
                                           "lower_empty": 1, "upper_empty": 1})
-        m.submodules.to_fetch = to_fetch = Delay(where_layout, cycles=fetch_at)
+        m.submodules.to_fetch = to_fetch = Delay(where_layout, cycles=fetch_at, registered=True)
         m.submodules.to_decision = to_decision = Delay(
-            where_layout, cycles=read_latency + graph.latency - fetch_at)
+            where_layout, cycles=read_latency + graph.latency - fetch_at, registered=True)
         valid = Signal(read_latency + graph.latency + 1)
         m.d.comb += [
             to_fetch.i.token.eq(token),
@@ -159,28 +163,29 @@ class Traversal(wiring.Component):
 
         # The interval, from where the token says it is.
         thread_bits = thread_width(self._num_threads)
-        m.submodules.intervals = intervals = memory.Memory(shape=self._intervals, depth=1 << thread_bits, init=[])
-        write, read = intervals.write_port(), intervals.read_port()
-        fetch = to_fetch.o.token
-        stepped = Signal(self._intervals, reset_less=True)
-        m.submodules.source = source = Delay(IntervalSource, cycles=read_latency)
+        m.submodules.intervals = intervals = BlockMemory(self._intervals, depth=1 << thread_bits)
+        write = intervals.write
+        fetch, fetching = to_fetch.o.token, valid[fetch_at]
+        m.submodules.source = source = Delay(IntervalSource, cycles=intervals.latency)
         m.d.comb += [
-            read.addr.eq(fetch.thread),
+            intervals.reading.eq(fetching & (fetch.interval == IntervalSource.STEP)),
+            intervals.address.eq(fetch.thread),
+            self.popping.eq(fetching & (fetch.interval == IntervalSource.POP)),
             self.popped_address.eq(fetch.thread),
             source.i.eq(fetch.interval),
         ]
-        m.d.sync += stepped.eq(read.data)
-        current = Signal(self._intervals)
+        m.submodules.select = select = Delay(self._intervals, cycles=select_latency)
+        current = select.o
         with m.Switch(source.o):
             with m.Case(IntervalSource.STEP):
-                m.d.comb += current.eq(stepped)
+                m.d.comb += select.i.eq(intervals.data)
             with m.Case(IntervalSource.POP):
-                m.d.comb += current.eq(self.popped_intervals)
+                m.d.comb += select.i.eq(self.popped_intervals)
             with m.Default():
                 for ray in range(PACKET_RAYS):
                     m.d.comb += [
-                        current[ray].t_near.eq(self._fmt.const(0.0)),
-                        current[ray].t_far.eq(self._fmt.const(float("inf"))),
+                        select.i[ray].t_near.eq(self._fmt.const(0.0)),
+                        select.i[ray].t_far.eq(self._fmt.const(float("inf"))),
                     ]
 
         where = to_decision.o
@@ -236,9 +241,9 @@ class Traversal(wiring.Component):
             self.child.payload.token.mask.eq(Mux(choice.upper, chosen.goes_upper, chosen.goes_lower)),
             self.child.payload.token.sp.eq(here.sp + choice.both),
             self.child.payload.token.interval.eq(IntervalSource.STEP),
-            write.addr.eq(here.thread),
+            write.valid.eq(self.child.valid),
+            write.address.eq(here.thread),
             write.data.eq(Mux(choice.upper, chosen.upper, chosen.lower)),
-            write.en.eq(self.child.valid),
             self.push.valid.eq(decided & choice.both),
             self.push.token.eq(here),
             self.push.token.mask.eq(Mux(choice.upper, chosen.goes_lower, chosen.goes_upper)),

@@ -11,8 +11,9 @@ from tests.fpu import clocked
 @pytest.mark.parametrize(("cycles", "memory_from"), [
     *((cycles, 100) for cycles in (0, 1, 2, 5)), *((cycles, 2) for cycles in (2, 3, 4, 7, 8, 33)), (4, 5), (5, 5)])
 @pytest.mark.parametrize("shape", [11, FloatFormat(5, 7)], ids=str)
-def test_delay(shape, cycles, memory_from):
-    dut = Delay(shape, cycles=cycles, memory_from=memory_from)
+@pytest.mark.parametrize("registered", [False, True])
+def test_delay(shape, cycles, memory_from, registered):
+    dut = Delay(shape, cycles=cycles, memory_from=memory_from, registered=registered)
     values = [float(value) if isinstance(shape, FloatFormat) else value
               for value in np.random.default_rng(8).integers(0, 256, 100).tolist()]
 

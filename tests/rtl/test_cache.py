@@ -79,7 +79,7 @@ def run_cache(*, seed, num_lines, line_items, item_width, num_fetches, gap, late
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize(("line_items", "item_width"), [(1, 32), (4, 32), (2, 64), (1, 288), (1, 24)])
+@pytest.mark.parametrize(("line_items", "item_width"), [(1, 33), (4, 32), (2, 64), (1, 288), (2, 24)])
 def test_every_request_is_answered_once_and_right(seed, line_items, item_width):
     # Near ones share lines; far ones, a multiple of the cache's size apart, evict each other.
     rng = random.Random(seed)
@@ -98,6 +98,40 @@ def test_lines_are_kept():
 
 
 def test_a_line_wanted_by_all_is_fetched_once():
-    events = run_cache(seed=2, num_lines=8, line_items=1, item_width=32, num_fetches=4, gap=0.0, latency=40,
+    events = run_cache(seed=2, num_lines=8, line_items=1, item_width=64, num_fetches=4, gap=0.0, latency=40,
                        indices=[5] * 8)
     assert events["lines"] == 1
+
+
+def test_a_hit_is_answered_after_5_cycles_one_a_clock():
+    dut = Cache(item_width=32, payload_shape=8, index_width=6, num_lines=4, line_items=2, num_waiting=16)
+    answered = []
+
+    async def warm_up_and_ask(ctx):
+        ctx.set(dut.line_request.ready, 1)
+        ctx.set(dut.response.ready, 1)
+        ctx.set(dut.request.valid, 1)
+        await ctx.tick()
+        ctx.set(dut.request.valid, 0)
+        await ctx.tick().until(dut.line_request.valid)
+        for word in (11, 22):
+            ctx.set(dut.line_data.valid, 1)
+            ctx.set(dut.line_data.payload, word)
+            await ctx.tick()
+        ctx.set(dut.line_data.valid, 0)
+        await ctx.tick().until(dut.response.valid)
+        ctx.set(dut.request.valid, 1)
+        for number in range(30):
+            ctx.set(dut.request.payload, {"index": number % 2, "payload": number})
+            assert ctx.get(dut.request.ready)
+            answered.append((ctx.get(dut.response.payload.payload), ctx.get(dut.response.payload.item))
+                            if ctx.get(dut.response.valid) else None)
+            await ctx.tick()
+
+    simulate(dut, warm_up_and_ask, name="cache")
+    assert answered == [None] * 5 + [(number, (11, 22)[number % 2]) for number in range(25)]
+
+
+def test_a_line_of_one_word():
+    with pytest.raises(ValueError, match="^A line of a cache has a single word; it must have 2 or more$"):
+        Cache(item_width=32, payload_shape=1, index_width=4, num_lines=2, num_waiting=1)

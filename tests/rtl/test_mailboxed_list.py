@@ -150,15 +150,20 @@ def run(world, *, num_threads):
     rng = world.rng_streams
 
     async def rest_of_the_chip(ctx):
+        begun = []
         while True:
             ctx.set(dut.begin.valid, 0)
+            # The way to a first leaf is long.
+            for _, packet in filter(lambda item: not item[0], begun):
+                world.leaves.append(packet.enter_leaf(0))
+            begun = [(cycles - 1, packet) for cycles, packet in begun if cycles]
             if world.idle and world.num_packets and rng.random() < 0.2:
                 thread = rng.choice(sorted(world.idle))
                 world.idle.remove(thread)
                 world.num_packets -= 1
                 packet = world.packets[thread] = Packet(world, thread)
-                world.leaves.append(packet.enter_leaf(0))
                 ctx.set(dut.begin, {"valid": 1, "thread": thread})
+                begun.append((4, packet))
             if world.waiting and rng.random() < 0.5:
                 port, packet, level = world.waiting.pop(rng.randrange(len(world.waiting)))
                 port.append(random_token(rng, thread=packet.thread, stack_depth=STACK_DEPTH, level=level,
@@ -203,25 +208,27 @@ def test_without_a_mailbox_nothing_is_skipped():
 
 
 def test_an_entry_a_cycle():
-    """A leaf whose entries have all been tested: as fast as the cache answers, and the list ends."""
-    dut = MailboxedList(num_threads=2, stack_depth=STACK_DEPTH, index_width=INDEX_WIDTH, mailbox_entries=2)
-    token = {"thread": 1, "mask": 0b0110}
+    """Leaves whose entries have all been tested: as fast as the cache answers, and the lists end."""
+    threads = 16
+    dut = MailboxedList(num_threads=threads, stack_depth=STACK_DEPTH, index_width=INDEX_WIDTH, mailbox_entries=2)
     rng = random.Random(0)
-    # The same triangle, as if by many leaves of the packet.
-    entries = deque({"item": 1 << 31 | 3, "payload": {"token": token, "list": 9}} for _ in range(20))
+    # Each packet finds its triangle in two leaves.
+    entries = deque({"item": 1 << 31 | 3, "payload": {"token": {"thread": thread, "mask": 0b0110}, "list": 9}}
+                    for _ in range(2) for thread in range(threads))
     jobs, pops = [], []
-    simulate(dut, until(lambda: len(pops) == 19), ticks=24, name="mailboxed_list", background=(
+    simulate(dut, until(lambda: len(pops) == threads), ticks=2 * threads + 10, name="mailboxed_list", background=(
         feed(dut.entry, entries, rng=rng), drain(dut.job, jobs.append), drain(dut.pop, pops.append)))
-    assert [(job.index, job.token.mask) for job in jobs] == [(3, 0b0110)]
+    assert [(job.token.thread, job.index, job.token.mask) for job in jobs] == [(k, 3, 0b0110) for k in range(threads)]
+    assert [pop.thread for pop in pops] == list(range(threads))
 
 
-def test_a_job_follows_its_entry_in_the_next_cycle():
+def test_a_job_follows_its_entry_4_cycles_later():
     dut = MailboxedList(num_threads=1, stack_depth=1, index_width=INDEX_WIDTH, mailbox_entries=1)
 
     async def offer(ctx):
         ctx.set(dut.entry.payload, {"item": 7, "payload": {"token": {"mask": 1}}})
         ctx.set(dut.entry.valid, 1)
-        for is_there in (0, 1, 0):
+        for is_there in (0, 0, 0, 0, 1, 0):
             assert ctx.get(dut.job.valid) == is_there
             await ctx.tick()
             ctx.set(dut.entry.valid, 0)

@@ -185,7 +185,7 @@ def test_pops_one_a_clock(cmp_latency):
 
     simulate(dut, fill_and_pop, answers, background=[clock], name="stack")
     assert [thread for _, thread in answered] == list(range(num_threads))
-    assert {end - begin for (begin, _), (end, _) in zip(asked, answered, strict=True)} == {2 + cmp_latency}
+    assert {end - begin for (begin, _), (end, _) in zip(asked, answered, strict=True)} == {4 + cmp_latency}
 
 
 def test_overflow_is_noticed():
