@@ -9,6 +9,7 @@ from .gltf import load_gltf
 from .mirror_room import mirror_room_scene
 from .obj import load_obj
 from .ply import load_ply
+from .quake_map import load_pk3, split_name
 from .room import room_scene
 from .sunflowers import sunflowers_scene
 from .vpl import vpl_scene
@@ -29,7 +30,8 @@ def load_scene(path):
     Parameters
     ----------
     path : str or path-like
-        A file ending in .obj, .ply, .ply.gz, .gltf or .glb, or a name in :data:`BUILT_IN`.
+        A file ending in .obj, .ply, .ply.gz, .gltf, .glb or .pk3 (FILE.pk3:MAP where it has several), or a name in
+        :data:`BUILT_IN`.
 
     Raises
     ------
@@ -39,10 +41,11 @@ def load_scene(path):
     path = Path(path)
     if str(path) in BUILT_IN:
         return BUILT_IN[str(path)]()
-    loader = next((load for suffix, load in _LOADERS.items() if path.name.lower().endswith(suffix)), None)
+    loader = load_pk3 if split_name(path) else next(
+        (load for suffix, load in _LOADERS.items() if path.name.lower().endswith(suffix)), None)
     if loader is None:
-        raise SceneError(f"{path}: unknown scene format; supported are {', '.join(_LOADERS)} and the built-in scenes "
-                         f"{', '.join(BUILT_IN)}")
+        raise SceneError(f"{path}: unknown scene format; supported are {', '.join(_LOADERS)}, .pk3 and the built-in "
+                         f"scenes {', '.join(BUILT_IN)}")
     try:
         scene = loader(path)
     except OSError as error:

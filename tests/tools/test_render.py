@@ -238,7 +238,7 @@ def test_missing_file(tmp_path):
 
 def test_unknown_format(tmp_path):
     fails(tmp_path, obj(tmp_path, "", "scene.stl"),
-          says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb and the "
+          says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb, \.pk3 and the "
                "built-in scenes room, mirror-room, vpl, walk, sunflowers")
 
 
