@@ -10,6 +10,7 @@ from .mirror_room import mirror_room_scene
 from .obj import load_obj
 from .ply import load_ply
 from .quake_map import load_pk3, split_name
+from .quake_player import load_md3
 from .room import room_scene
 from .sunflowers import sunflowers_scene
 from .vpl import vpl_scene
@@ -21,7 +22,8 @@ __all__ = ["BUILT_IN", "load_scene"]
 BUILT_IN = {"room": room_scene, "mirror-room": mirror_room_scene, "vpl": vpl_scene, "walk": walk_scene,
             "sunflowers": sunflowers_scene}
 
-_LOADERS = {".obj": load_obj, ".ply": load_ply, ".ply.gz": load_ply, ".gltf": load_gltf, ".glb": load_gltf}
+_LOADERS = {".obj": load_obj, ".ply": load_ply, ".ply.gz": load_ply, ".gltf": load_gltf, ".glb": load_gltf,
+            ".md3": load_md3}
 
 
 def load_scene(path):
@@ -30,8 +32,8 @@ def load_scene(path):
     Parameters
     ----------
     path : str or path-like
-        A file ending in .obj, .ply, .ply.gz, .gltf, .glb or .pk3 (FILE.pk3:MAP where it has several), or a name in
-        :data:`BUILT_IN`.
+        A file ending in .obj, .ply, .ply.gz, .gltf, .glb, .md3 or .pk3 (FILE.pk3:MAP where it has several maps),
+        or a name in :data:`BUILT_IN`.
 
     Raises
     ------

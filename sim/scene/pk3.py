@@ -1,11 +1,12 @@
-"""Game archives (.pk3): zip files, read with bounds on what they may unpack to."""
+"""Game archives (.pk3), zip files read with bounds on what they may unpack to; and folders, as unpacked ones."""
 
 import zipfile
 from pathlib import PurePosixPath
 
 from .error import SceneError
+from .files import inside
 
-__all__ = ["Archive"]
+__all__ = ["Archive", "Folder"]
 
 # The largest of the game's own files is a tenth of this; a few bytes must not take the machine's memory.
 _MAX_FILE = 1 << 26
@@ -82,3 +83,48 @@ class Archive:
         if len(data) < size:
             raise SceneError(f"{place}: claims {size} bytes but has {len(data)}; it is cut short")
         return data
+
+
+class Folder:
+    """The files below a folder, by names without case, as if it were packed.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path):
+        self.path = path
+
+    def _find(self, name):
+        """The file of a name in a folder below, or None."""
+        found = self.path
+        for part in _key(name).split("/"):
+            if not found.is_dir():
+                return None
+            found = next((entry for entry in sorted(found.iterdir()) if entry.name.lower() == part), None)
+            if found is None:
+                return None
+        return inside(self.path, str(found.relative_to(self.path)))
+
+    def __contains__(self, name):
+        found = self._find(name)
+        return found is not None and found.is_file()
+
+    def names(self, folder, suffix):
+        """As of :class:`Archive`."""
+        found = self._find(folder)
+        if found is None or not found.is_dir():
+            return []
+        return sorted(f"{folder}/{entry.name.lower()}" for entry in found.iterdir()
+                      if entry.name.lower().endswith(suffix) and entry.is_file())
+
+    def read(self, name):
+        """As of :class:`Archive`."""
+        found = self._find(name)
+        if found is None:
+            raise SceneError(f"{self.path}: has no file {name}")
+        size = found.stat().st_size
+        if size > _MAX_FILE:
+            raise SceneError(f"{found}: has {size:,} bytes; at most {_MAX_FILE:,} are read")
+        return found.read_bytes()

@@ -14,6 +14,7 @@ from .entities import numbers, parse_entities
 from .error import SceneError
 from .pk3 import Archive
 from .quake_looks import QuakeLooks
+from .quake_player import has_player, player_scene
 from .scene import Instance, Scene
 
 __all__ = ["load_pk3", "map_scene", "split_name"]
@@ -114,20 +115,22 @@ def map_scene(archive, name, *, level=4):
 
 
 def load_pk3(path, *, level=4):
-    """Scene of a map in a game archive.
+    """Scene of a map in a game archive, or of a player.
 
     Parameters
     ----------
     path : path-like
-        FILE.pk3 of one map, or FILE.pk3:MAP.
+        FILE.pk3 of one map, or FILE.pk3:MAP or FILE.pk3:PLAYER.
     level : int
         As of :func:`map_scene`.
 
     Raises
     ------
     SceneError
-        If there is no such map, or it is damaged.
+        If there is no such map or player, or it is damaged.
     """
     file, name = split_name(path)
     archive = Archive(file)
+    if name is not None and f"maps/{name}.bsp" not in archive and has_player(archive, name):
+        return player_scene(archive, name)
     return map_scene(archive, _chosen(archive, file, name), level=level)[0]

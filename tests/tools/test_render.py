@@ -238,8 +238,8 @@ def test_missing_file(tmp_path):
 
 def test_unknown_format(tmp_path):
     fails(tmp_path, obj(tmp_path, "", "scene.stl"),
-          says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb, \.pk3 and the "
-               "built-in scenes room, mirror-room, vpl, walk, sunflowers")
+          says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb, \.md3, "
+              r"\.pk3 and the built-in scenes room, mirror-room, vpl, walk, sunflowers")
 
 
 def gltf(tmp_path, *, uri="data.bin", matrix=None, byte_length=36, data=None):
