@@ -43,17 +43,19 @@ def load_scene(path):
     path = Path(path)
     if str(path) in BUILT_IN:
         return BUILT_IN[str(path)]()
-    loader = load_pk3 if split_name(path) else next(
+    archive = split_name(path)
+    loader = load_pk3 if archive else next(
         (load for suffix, load in _LOADERS.items() if path.name.lower().endswith(suffix)), None)
     if loader is None:
         raise SceneError(f"{path}: unknown scene format; supported are {', '.join(_LOADERS)}, .pk3 and the built-in "
                          f"scenes {', '.join(BUILT_IN)}")
+    file = archive[0] if archive else str(path)
     try:
         scene = loader(path)
     except OSError as error:
-        raise SceneError(f"{path}: {error.strerror or error}") from error
+        raise SceneError(f"{file}: {error.strerror or error}") from error
     except SceneError as error:
-        if str(error).startswith(str(path)):
+        if str(error).startswith(file):
             raise
-        raise SceneError(f"{path}: {error}") from error
+        raise SceneError(f"{file}: {error}") from error
     return replace(scene, warnings=scene.warnings + unusable_warnings(scene.meshes))
