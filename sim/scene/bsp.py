@@ -27,7 +27,7 @@ _SKY, _NOT_DRAWN = 0x4, 0x380
 _MAX_SIDE = 129
 # Faces may share vertices: a small file must not claim the machine's memory. The largest maps have a tenth of this.
 _MAX_TRIANGLES = 1 << 20
-_MAX_TEXT = 1 << 22
+_MAX_TEXT = 1 << 20
 
 
 class Bsp:

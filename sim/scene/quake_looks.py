@@ -6,6 +6,7 @@ import numpy as np
 
 from .error import SceneError
 from .material import DEFAULT_MATERIAL, Material
+from .pk3 import read_text
 from .shader_script import parse_shaders
 from .srgb import decode, encode
 from .texture import decode_texture, resampling_warning
@@ -72,7 +73,7 @@ class QuakeLooks:
         self._shaders = {}
         size = 0
         for name in archive.names("scripts", ".shader"):
-            text = archive.read(name).decode("latin-1")
+            text = read_text(archive, name)
             size += len(text)
             if size > _MAX_SCRIPTS:
                 raise SceneError(f"{name}: with it there are more than {_MAX_SCRIPTS:,} bytes of shader scripts")

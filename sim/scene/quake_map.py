@@ -66,8 +66,8 @@ def _placed(entities, bsp, place):
         if not model.startswith("*") or kind.startswith("trigger_"):
             continue
         if not model[1:].isdecimal() or not 0 < int(model[1:9]) < bsp.num_models:
-            raise SceneError(f"{place}: entity '{kind}': there is no model '{model[:9]}'; the map has "
-                             f"*1 to *{bsp.num_models - 1}")
+            raise SceneError(f"{place}: entity '{kind}': there is no model '{model[:9]}'; "
+                             + (f"the map has *1 to *{bsp.num_models - 1}" if bsp.num_models > 1 else "it has none"))
         yield int(model[1:]), f"{model} {kind}", numbers(entity, "origin", (0.0, 0.0, 0.0), place)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from .error import SceneError
 from .md3 import Md3
-from .pk3 import Folder
+from .pk3 import Folder, read_text
 from .quake_looks import QuakeLooks
 from .scene import IDENTITY, Instance, Mesh, Scene
 
@@ -45,7 +45,7 @@ def _skin(archive, path):
     """Shaders of surfaces, by name, from a .skin file: lines of surface, comma, picture."""
     if path not in archive:
         return {}
-    lines = archive.read(path).decode("latin-1").lower().splitlines()
+    lines = read_text(archive, path).lower().splitlines()
     pairs = (line.split(",", 1) for line in lines if "," in line)
     return {surface.strip(): picture.strip() for surface, picture in pairs if picture.strip()}
 
@@ -89,7 +89,7 @@ def _standing(archive, name):
     if path not in archive:
         return 0, 0
     firsts = []
-    for line in archive.read(path).decode("latin-1").splitlines():
+    for line in read_text(archive, path).splitlines():
         words = line.split("//", 1)[0].split()
         if len(words) == 4 and all(word.isascii() and word.isdecimal() and len(word) < 9 for word in words):
             firsts.append(int(words[0]))

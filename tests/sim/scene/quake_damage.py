@@ -76,7 +76,7 @@ def _entities(rng):
 
 _MODEL = md3([surface(name, shader="x", frames=[[(0, 0, 0), (1, 0, 0), (0, 1, 0)]] * 2, normals=[(1, 2)] * 3,
                       uvs=[(0, 0)] * 3, triangles=[(0, 1, 2)]) for name in "ab"], num_frames=2)
-# Bytes of address space within which all has to be read: with the libraries' own, a GB is left.
+# Bytes of address space within which all has to be read, the libraries' own among them.
 _MEMORY = 3 << 30
 #: Of each kind of damage: the scene to load, its file, and a function from a random generator to the file's bytes.
 FORMATS = {

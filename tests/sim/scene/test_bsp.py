@@ -121,6 +121,7 @@ def test_patches_are_the_analytic_surface():
     (dict(entities='{ "model" "*2" "classname" "x" }'),
      "entity 'x': there is no model '*2'; the map has *1 to *1"),
     (dict(entities='{ "model" "*x" }'), "entity '': there is no model '*x'; the map has *1 to *1"),
+    (dict(models=[(0, 7)]), "entity 'func_door': there is no model '*1'; it has none"),
     (dict(entities=ENTITIES + "{"), "entity 4: has no '}'"),
     (dict(entities="} {"), "entity 0: '} {' is not understood"),
     (dict(entities='{ "a" "b" } c'), "entity 1: 'c' is not understood"),
@@ -129,7 +130,7 @@ def test_patches_are_the_analytic_surface():
      "entity 'info_player_start': 'origin' must be 3 finite numbers, not '1 2'"),
     (dict(entities='{ "classname" "info_player_start" "angle" "nan" }'),
      "entity 'info_player_start': 'angle' must be 1 finite number, not 'nan'"),
-    (dict(entities='{ "a" "' + "b" * (1 << 22) + '" }'), "entities: 4,194,315 bytes; at most 4,194,304 are read"),
+    (dict(entities='{ "a" "' + "b" * (1 << 20) + '" }'), "entities: 1,048,587 bytes; at most 1,048,576 are read"),
 ])
 def test_errors(load, tmp_path, changes, message):
     with pytest.raises(SceneError, match=f"^{re.escape(f'{tmp_path}/a.pk3: maps/small.bsp: {message}')}$"):

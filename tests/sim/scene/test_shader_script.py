@@ -139,9 +139,12 @@ def test_a_surface_without_a_shader_has_the_picture_of_its_name(looks):
 
 
 def test_too_much(looks, tmp_path, monkeypatch):
-    with pytest.raises(SceneError, match=r"^scripts/a\.shader: with it there are more than 4,194,304 bytes of shader "
-                                         "scripts$"):
-        looks("x" * ((1 << 22) + 1))
+    with pytest.raises(SceneError, match=rf"^{tmp_path}/a\.pk3: scripts/a\.shader: has 1,048,577 bytes; of texts at "
+                                         "most 1,048,576 are read$"):
+        looks("x" * ((1 << 20) + 1))
+    monkeypatch.setattr("sim.scene.quake_looks._MAX_SCRIPTS", 5)
+    with pytest.raises(SceneError, match=r"^scripts/a\.shader: with it there are more than 5 bytes of shader scripts$"):
+        looks("123456")
     monkeypatch.setattr("sim.scene.quake_looks._MAX_TEXELS", 31)
     look = looks("", a=(1, 2, 3), b=(1, 2, 3))
     look.material("textures/a")
