@@ -244,7 +244,7 @@ def test_archives_of_a_game(tmp_path):
     path.write_bytes(pk3({"maps/one.bsp": bsp(**small_map()), "maps/two.bsp": b""}))
     fails(tmp_path, path, says=r"a\.pk3: has the maps one, two; name one, as in \S+a\.pk3:one")
     fails(tmp_path, f"{path}:two", says=r"a\.pk3: maps/two\.bsp: not a map of Quake III \(IBSP, version 46\)")
-    result = run("render", f"{path}:one", "--engine", "model", "--size", "16x12", "-o", tmp_path / "one.png")
+    result = run("render", f"{path}:one", "--engine", "golden", "--size", "16x12", "-o", tmp_path / "one.png")
     assert result.exit_code == 0, result.output
 
 
