@@ -37,13 +37,15 @@ class Archive:
     def __init__(self, path):
         self.path = path
         self._left = _MAX_TOTAL
-        with open(path, "rb") as file:
-            try:
-                with zipfile.ZipFile(file) as archive:
-                    members = archive.infolist()
-            # Of damaged directories zipfile raises what it stumbles over.
-            except Exception as error:
-                raise SceneError(f"{path}: not a .pk3 (zip) file: {error}") from None
+        try:
+            # Kept open, as its directory may be long; it closes itself.
+            self._zip = zipfile.ZipFile(path)
+            members = self._zip.infolist()
+        except OSError:
+            raise
+        # Of damaged directories zipfile raises what it stumbles over.
+        except Exception as error:
+            raise SceneError(f"{path}: not a .pk3 (zip) file: {error}") from None
         # Of files of one name the last counts, as in zipfile.
         self._members = {_key(member.filename): member for member in members if not member.is_dir()}
 
@@ -75,7 +77,7 @@ class Archive:
             raise SceneError(f"{place}: with it more than {_MAX_TOTAL:,} bytes would have been unpacked")
         self._left -= size
         try:
-            with zipfile.ZipFile(self.path) as archive, archive.open(member) as file:
+            with self._zip.open(member) as file:
                 data = file.read(size)
         except OSError:
             raise
