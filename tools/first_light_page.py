@@ -115,5 +115,6 @@ def page(results):
     parts += [f"![{row['scene']}](pictures/first-light-{row['scene']}.png)\n" for row in rows]
     parts.append("Conference room © Anat Grynberg and Greg Ward; simple room by Greg Ward; bunny from the Stanford "
                  "3D Scanning Repository; grande salle © LAAS-CNRS/ONERA; terrain from frozen_river by Jasmin Patry, "
-                 "bush © Scopia Visual Interfaces Systems.\n")
+                 "bush © Scopia Visual Interfaces Systems" + ("; oa_dm5 © OpenArena Team." if any(
+                     row["scene"] == "quake3-oa_dm5" for row in rows) else ".") + "\n")
     return "\n".join(parts)

@@ -13,6 +13,7 @@ SCENES = (
     ("bunny", "classic/stanford-bunny.obj", "bunny"),
     ("conference", "conference/conference.obj", "conference"),
     ("grande_salle", "office_laas_grande_salle/grande_salle.obj", "office"),
+    ("quake3-oa_dm5", "openarena/quake3-oa_dm5.pk3", "quake3"),
     ("terrain", "terrain.glb", "terrain"),
 )
 

@@ -67,8 +67,8 @@ _CHECKED_PIXELS = 1 << 21
 @click.option("--check/--no-check", default=True, help="Compare with the model and with golden")
 def render(scene, output, engine, size, fmt, camera, view, frames, shading, depth, sky, background, flatten,
            center, parameters, latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
-    """Draw SCENE: an .obj, .ply, .ply.gz, .gltf or .glb file, or a built-in one: room, mirror-room, vpl, walk or
-    sunflowers."""
+    """Draw SCENE: an .obj, .ply, .ply.gz, .gltf, .glb or .md3 file, a map in a .pk3 (FILE.pk3, or FILE.pk3:MAP where it
+    has several), or a built-in one: room, mirror-room, vpl, walk or sunflowers."""
     _check_shading(engine, shading, depth, sky, hits)
     order = Order(engine=engine, size=size, config=chip_config(fmt, parameters), shading=shading,
                   depth=4 if depth is None else depth, background=background, latency=latency, jitter=jitter,

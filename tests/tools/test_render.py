@@ -15,6 +15,7 @@ from PIL import Image
 
 from sim.golden import render_golden
 from sim.scene import load_scene
+from tests.sim.scene.quake_builder import bsp, pk3, small_map
 from tools.animation import frame_durations
 from tools.cli import main
 from tools.errors import BadInput
@@ -236,10 +237,21 @@ def test_missing_file(tmp_path):
     fails(tmp_path, tmp_path / "none.obj", says=r"none\.obj: No such file or directory")
 
 
+def test_archives_of_a_game(tmp_path):
+    path = tmp_path / "a.pk3"
+    path.write_bytes(b"no zip")
+    fails(tmp_path, path, says=r"a\.pk3: not a \.pk3 \(zip\) file: File is not a zip file")
+    path.write_bytes(pk3({"maps/one.bsp": bsp(**small_map()), "maps/two.bsp": b""}))
+    fails(tmp_path, path, says=r"a\.pk3: has the maps one, two; name one, as in \S+a\.pk3:one")
+    fails(tmp_path, f"{path}:two", says=r"a\.pk3: maps/two\.bsp: not a map of Quake III \(IBSP, version 46\)")
+    result = run("render", f"{path}:one", "--engine", "golden", "--size", "16x12", "-o", tmp_path / "one.png")
+    assert result.exit_code == 0, result.output
+
+
 def test_unknown_format(tmp_path):
     fails(tmp_path, obj(tmp_path, "", "scene.stl"),
-          says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb and the "
-               "built-in scenes room, mirror-room, vpl, walk, sunflowers")
+          says=r"scene\.stl: unknown scene format; supported are \.obj, \.ply, \.ply\.gz, \.gltf, \.glb, \.md3, "
+              r"\.pk3 and the built-in scenes room, mirror-room, vpl, walk, sunflowers")
 
 
 def gltf(tmp_path, *, uri="data.bin", matrix=None, byte_length=36, data=None):
