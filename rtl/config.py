@@ -33,7 +33,8 @@ class ChipConfig:
     node_lines, list_lines, matrix_lines : int
         Lines of the three caches.
     node_line_items, list_line_items : int
-        Nodes (8 bytes each) and list entries (4 bytes each) in a line; a matrix (36 bytes) is a line by itself.
+        Nodes (8 bytes each) and list entries (4 bytes each) in a line, which has 8 bytes or more; a matrix (36 bytes)
+        is a line by itself.
     num_fetches : int
         Lines that each cache may have requested from memory at a time.
     index_width : int
@@ -93,12 +94,12 @@ class ChipConfig:
             "add_latency": (0, 32), "mul_latency": (0, 32), "div_latency": (0, 64), "cmp_latency": (0, 8),
             "num_threads": (1, 64), "stack_depth": (1, 64), "mailbox_entries": (0, 16),
             "node_lines": (2, 1 << 16), "node_line_items": (1, 8), "list_lines": (2, 1 << 16),
-            "list_line_items": (1, 16), "matrix_lines": (2, 1 << 16), "num_fetches": (1, 16),
+            "list_line_items": (2, 16), "matrix_lines": (2, 1 << 16), "num_fetches": (1, 16),
             "index_width": (8, 24), "coord_width": (4, 14),
             "arithmetic": (0, len(ARITHMETICS) - 1), "num_pipelines": (1, 4), "offset_log2": (0, 8),
             "edge_tolerance": (0, 64),
             "num_shaders": (1, 4),
-            "shading_lines": (2, 1 << 16), "texture_lines": (2, 1 << 16), "texture_line_items": (1, 16),
+            "shading_lines": (2, 1 << 16), "texture_lines": (2, 1 << 16), "texture_line_items": (2, 16),
         }
         for name, (low, high) in ranges.items():
             value = getattr(self, name)

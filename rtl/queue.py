@@ -1,7 +1,7 @@
 """Queues and the merging of streams."""
 
 from amaranth.hdl import Assert, Module, Mux, Shape, Signal
-from amaranth.lib import data, memory, stream, wiring
+from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from .block_memory import BlockMemory

@@ -133,5 +133,5 @@ def test_a_hit_is_answered_after_5_cycles_one_a_clock():
 
 
 def test_a_line_of_one_word():
-    with pytest.raises(ValueError, match="^A line of a cache has a single word; it must have 2 or more$"):
+    with pytest.raises(ValueError, match=r"^A line of a cache has a single word; it must have 2 or more$"):
         Cache(item_width=32, payload_shape=1, index_width=4, num_lines=2, num_waiting=1)

@@ -60,7 +60,7 @@ def test_latencies():
 
 @pytest.mark.parametrize("extreme", [
     dict(num_threads=1, stack_depth=1, mailbox_entries=0, num_fetches=1),
-    dict(num_threads=3, mailbox_entries=1, node_line_items=1, list_line_items=1, node_lines=2, list_lines=2,
+    dict(num_threads=3, mailbox_entries=1, node_line_items=1, list_line_items=2, node_lines=2, list_lines=2,
          matrix_lines=2),
     dict(add_latency=0, mul_latency=0, div_latency=2, cmp_latency=0),
     dict(index_width=8, coord_width=4, node_lines=2, list_lines=2, matrix_lines=2),

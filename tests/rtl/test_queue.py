@@ -27,7 +27,7 @@ def test_queue_keeps_order(seed, depth, gaps, block):
             assert level == len(held) <= depth
             assert ready == (len(held) < depth)
             # What was written in one cycle is there in the next; from block RAM, perhaps one later after another.
-            assert valid == bool(held) or block and held and had_one
+            assert valid == bool(held) or (block and held and had_one)
             had_one = bool(reads and valid)
             if reads and valid:
                 held.popleft()
