@@ -11,8 +11,11 @@ from rtl.config import ChipConfig
 from sim.scene import Camera, SceneError
 
 from .chip_file import chip_of
+from .errors import BadInput
+from .quality import Quality
 
-__all__ = ["CAMERA", "CHIP", "CYCLES", "FORMAT", "PIXEL", "SIZE", "chip_config", "docs_option", "scenes_option"]
+__all__ = ["CAMERA", "CHIP", "CYCLES", "FORMAT", "PIXEL", "QUALITY", "SIZE", "camera_of", "chip_config", "docs_option",
+           "scenes_option"]
 
 
 class _Parsed(click.ParamType):
@@ -69,6 +72,7 @@ PIXEL = _Parsed("X,Y", _pixel)
 CYCLES = _Parsed("FIRST:LAST", _cycles)
 CAMERA = _Parsed("NUMBERS", Camera.parse)
 FORMAT = _Parsed("E.F", FloatFormat.parse)
+QUALITY = _Parsed("NAME=BOUND,...", Quality.parse)
 CHIP = _Parsed("NAME=NUMBER|FILE.json", _chip)
 
 
@@ -106,3 +110,21 @@ def chip_config(fmt, parameters):
         return replace(config, **({"fmt": fmt} if fmt else {}), **changed)
     except ValueError as error:
         raise click.UsageError(f"--chip: {error}") from error
+
+
+def camera_of(scene, camera, view):
+    """The Camera that ``--camera`` and ``--view`` ask for.
+
+    Raises
+    ------
+    BadInput
+        If the scene has no such view.
+    """
+    if camera is not None:
+        return camera
+    if view is None:
+        return scene.default_camera()
+    if view >= len(scene.cameras):
+        have = f"cameras 0 to {len(scene.cameras) - 1}" if scene.cameras else "no cameras; use --camera"
+        raise BadInput(f"--view: there is no camera {view}, the scene has {have}")
+    return scene.cameras[view]

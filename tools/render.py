@@ -17,7 +17,7 @@ from sim.scene.texture import decode_texture
 from .animation import frame_durations, save_animation, save_picture
 from .engines import ENGINES, Order, draw, model_picture, progress_on
 from .errors import BadInput, clear_errors, written_whole
-from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, chip_config
+from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, camera_of, chip_config
 
 __all__ = ["render"]
 
@@ -85,7 +85,7 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
     console = Console(stderr=True, highlight=False)
     with clear_errors(), contextlib.ExitStack() as files:
         loaded = load_scene(scene)
-        chosen = _camera(loaded, camera, view)
+        chosen = camera_of(loaded, camera, view)
         if sky is not None:
             loaded = replace(loaded, sky=_panorama(sky, chosen))
         if frames and not loaded.is_animated:
@@ -103,7 +103,7 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
         if wave:
             order = replace(order, wave=files.enter_context(written_whole(wave)))
 
-        poses = [(posed, chosen if camera is not None else _camera(posed, None, view))
+        poses = [(posed, chosen if camera is not None else camera_of(posed, None, view))
                  for posed in map(loaded.at_time, times)]
         chip = order.config if compiled is None else order.chip_for(compiled)
         drawn = []
@@ -178,17 +178,6 @@ def _check_options(order, output, frames, hits):
             raise click.UsageError(f"--wave-pixel: {x},{y} is outside of the picture of {width}x{height}")
     if hits is not None and frames and frames > 1:
         raise click.UsageError("--hits is of one picture; leave --frames out")
-
-
-def _camera(scene, camera, view):
-    if camera is not None:
-        return camera
-    if view is None:
-        return scene.default_camera()
-    if view >= len(scene.cameras):
-        have = f"cameras 0 to {len(scene.cameras) - 1}" if scene.cameras else "no cameras; use --camera"
-        raise BadInput(f"--view: there is no camera {view}, the scene has {have}")
-    return scene.cameras[view]
 
 
 def _panorama(path, camera):
