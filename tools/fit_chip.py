@@ -285,8 +285,8 @@ class Fitting:
                       "no mesh is there twice and nothing moves" if compiled.is_flat else
                       "meshes are there more than once, or move")
         if not any(reason.what == "stack_depth" for reason in self.reasons):
-            self._because("stack_depth", config.stack_depth, f"the deepest of the scene's kd-trees has {deepest} levels "
-                          "below its root, and no ray puts off more nodes than that, wherever it goes")
+            self._because("stack_depth", config.stack_depth, f"the deepest of the scene's kd-trees has {deepest} "
+                          "levels below its root, and no ray puts off more nodes than that, wherever it goes")
         memories = {name: len(getattr(images[0], name)) for name in images[0].bytes_of_memories}
         name = max(memories, key=memories.get)
         self._because("index_width", config.index_width, f"the largest memory, {name}, has {memories[name]:,} items")

@@ -102,7 +102,7 @@ class Pictures:
         return worst
 
     def other_pixels(self, depth):
-        """Per cent of golden's pixels that differ by more than 8 levels of 255 with but ``depth`` generations of rays."""
+        """Per cent of golden's pixels that differ by more than 8 levels of 255 at a ``depth`` of rays."""
         most = 0.0
         for truth, (posed, camera) in zip(self._truths, self.poses, strict=True):
             shallow = render_golden(posed, camera, *self.size, shading=self.shading, depth=depth).color

@@ -34,8 +34,8 @@ class _Static:
 
 def _check_number(name, number, most):
     if number > most:
-        raise SceneError(f"scene needs {number:,} {name}, more than the {most:,} that the chip's memory addresses; leave "
-                         "objects out or build a chip with a wider index_width")
+        raise SceneError(f"scene needs {number:,} {name}, more than the {most:,} that the chip's memory addresses; "
+                         "leave objects out or build a chip with a wider index_width")
 
 
 def _even(number):
