@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass, fields, replace
 
+from fpu import FloatFormat
 from fpu.reciprocal import MAX_FRAC_WIDTH
 from rtl.arithmetic import ARITHMETICS
 from rtl.config import ChipConfig
@@ -84,6 +85,8 @@ class Fitting:
         shading, asked = shading or ("simple" if plain else "full"), shading is not None
         self._pictures = Pictures(scene, poses, size, shading=shading, depth=depth, flatten=flatten, progress=progress)
         self._clock = Clockwork(pictures=self._pictures, latency=latency, progress=progress)
+        # Roots, which lights and mirrors need, go by table.
+        self._most_bits = MAX_FRAC_WIDTH if shading == "full" else FloatFormat(8, 23).frac_width
         if shading == "simple":
             self._because("shader", "none", "asked for" if asked else "the scene has neither lights nor ambient light, "
                           "and its materials are colours alone")
@@ -139,11 +142,12 @@ class Fitting:
             self._progress(f"drawing by the model at {fmt}, {variant}")
             return self._pictures.faults(self._chip(fmt, **VARIANTS[variant]))
 
-        search = FormatSearch(faults_of, self._quality, tell=self._tell)
+        search = FormatSearch(faults_of, self._quality, most_bits=self._most_bits, tell=self._tell)
         candidates = search.run()
         if not candidates:
             near = search.best()
-            raise BadInput("no format draws this well enough (" + str(self._quality) + "); " + (
+            raise BadInput(f"no format of up to {self._most_bits} fraction bits draws this well enough "
+                           f"({self._quality}); " + (
                 f"what comes nearest is {near[0]}, {near[1]}: {near[2]}; ask for less with --quality" if near else
                 "the scene fits none: " + next(iter(search.tried.values()))))
         self.tried = {f"{exponent}.{fraction}, {variant}": faults if isinstance(faults, str) else asdict(faults)
@@ -176,8 +180,11 @@ class Fitting:
         if way.arithmetic != _NUMBERS["separate"]:
             return [way]
         by_table, by_reciprocal = (replace(way, arithmetic=_NUMBERS[name]) for name in ("table", "reciprocal"))
-        # Quotients by table are the same, bit for bit, but there is none for wider fractions.
-        ways = [by_table if candidate.fmt.frac_width <= MAX_FRAC_WIDTH else way]
+        # There are no tables for wider fractions.
+        if candidate.fmt.frac_width > MAX_FRAC_WIDTH:
+            return [way]
+        # Quotients by table are the same, bit for bit.
+        ways = [by_table]
         faults = self._pictures.faults(by_reciprocal)
         self._tell(f"{self._name(by_reciprocal)}: {faults}")
         if not isinstance(faults, str) and self._quality.admits(faults):

@@ -52,6 +52,8 @@ class FormatSearch:
     faults_of : callable
         ``faults_of(fmt, variant)``: the Faults, or a text if the scene does not fit.
     quality : Quality
+    most_bits : int
+        Fraction bits that the chip can be built with; wider ones are drawn, but not taken.
     variants : dict
         As :data:`VARIANTS`.
     tell : callable
@@ -60,6 +62,7 @@ class FormatSearch:
 
     faults_of: object
     quality: object
+    most_bits: int = _FRACTIONS[-1]
     variants: dict = field(default_factory=lambda: VARIANTS)
     tell: object = print
     tried: dict = field(default_factory=dict)
@@ -67,7 +70,7 @@ class FormatSearch:
     def run(self):
         """The Candidates, at most one a variant, narrowest first; none if nothing is good enough."""
         exponent = self._exponent()
-        found, last = {}, _FRACTIONS[-1]
+        found, last = {}, self.most_bits
         for fraction in _FRACTIONS:
             good = [variant for variant in self.variants
                     if variant not in found and self._is_good(exponent, fraction, variant)]

@@ -9,9 +9,11 @@ import click
 import numpy as np
 from rich.console import Console
 
+from fpu.reciprocal import MAX_FRAC_WIDTH
 from sim.golden import MAX_DEPTH, SHADINGS, psnr, render_golden
 from sim.scene import Sky, load_scene
 from sim.scene.compile import CompiledScene
+from sim.scene.limits import limit_warnings
 from sim.scene.texture import decode_texture
 
 from .animation import frame_durations, save_animation, save_picture
@@ -98,7 +100,7 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
                 compiled = CompiledScene(loaded, fmt=config.fmt, stack_depth=order.config.stack_depth,
                                          index_width=order.config.index_width, flatten=flatten,
                                          from_eye=center == "eye")
-        for warning in [*loaded.warnings, *(compiled.warnings if compiled else [])]:
+        for warning in [*loaded.warnings, *(_chip_warnings(compiled, order, center) if compiled else [])]:
             console.print(f"warning: {warning}", markup=False)
         if wave:
             order = replace(order, wave=files.enter_context(written_whole(wave)))
@@ -130,6 +132,13 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
             reports = [frame.report for _, frame in drawn]
             files.enter_context(written_whole(report)).write_text(
                 json.dumps(reports if frames else reports[0], indent=1) + "\n")
+
+
+def _chip_warnings(compiled, order, center):
+    # Roots go by table, which simulated chips with full shading need.
+    most_bits = {"most_bits": MAX_FRAC_WIDTH} if order.is_full and order.engine != "model" else {}
+    return [*compiled.warnings, *limit_warnings(compiled.scene, fmt=order.config.fmt, is_flat=compiled.is_flat,
+                                                from_eye=center == "eye", **most_bits)]
 
 
 def _is_gif(path):
