@@ -1,52 +1,36 @@
 """What decides each parameter of the smallest chip for a scene."""
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, replace
+
+from amaranth.utils import exact_log2
 
 from fpu import FloatFormat
 from fpu.reciprocal import MAX_FRAC_WIDTH
 from rtl.arithmetic import ARITHMETICS
 from rtl.config import ChipConfig
-from rtl.program.features import ShaderFeatures
 from sim.scene.shading_image import needed_features
 
 from .errors import BadInput
 from .fit_area import FULL, area_of, blocks_of, datapath_tables, smallest_device, speed_of
 from .fit_format import VARIANTS, FormatSearch
 from .fit_pictures import Pictures
+from .fit_reasons import CACHES, SWITCHES, Reason, reasons_of
 from .fit_speed import Clockwork, SpeedSearch
 
-__all__ = ["Fitting", "Reason", "is_plain"]
+__all__ = ["Fitting", "is_plain"]
 
 #: The picture by which threads and more are fitted.
 _SMALL = 96, 72
 _NUMBERS = {arithmetic.name: number for number, arithmetic in enumerate(ARITHMETICS)}
-_SWITCHES = tuple(field.name for field in fields(ShaderFeatures) if field.type is bool)
 #: What is there in full shading of any scene.
 _ALWAYS = {"point_lights", "shadows"}
-
-
-@dataclass(frozen=True)
-class Reason:
-    """Why a parameter has its value.
-
-    Parameters
-    ----------
-    what : str
-        The parameter, or what is worth knowing besides.
-    value
-    why : str
-    """
-
-    what: str
-    value: object
-    why: str
 
 
 def is_plain(scene):
     """Whether a scene has nothing but colours, which simple shading shows."""
     needs = needed_features(scene, instances=False)
     return not scene.lights and not any(scene.ambient) and not [
-        name for name in _SWITCHES if getattr(needs, name) and name not in _ALWAYS]
+        name for name in SWITCHES if getattr(needs, name) and name not in _ALWAYS]
 
 
 class Fitting:
@@ -81,6 +65,7 @@ class Fitting:
                  tell=print, progress=lambda text: None):
         self._quality, self._slower, self._tell, self._progress = quality, slower, tell, progress
         self.reasons, self.figures = [], {}
+        self._tables, self._whole_tables, self._timed = None, None, None
         plain = is_plain(scene)
         shading, asked = shading or ("simple" if plain else "full"), shading is not None
         self._pictures = Pictures(scene, poses, size, shading=shading, depth=depth, flatten=flatten, progress=progress)
@@ -120,7 +105,8 @@ class Fitting:
             config = self._smallest(config, ways)
         self.config = config
         compiled, images = pictures.compiled(config.fmt, stack_depth=config.stack_depth)
-        self._explain(config, compiled, images)
+        self.reasons += reasons_of(config, compiled, images, size=pictures.size, tried=self._search.tried,
+                                   tables=self._whole_tables)
         faults = pictures.faults(config)
         if isinstance(faults, str) or not self._quality.admits(faults):
             raise BadInput(f"the chip that was found does not draw well enough: {faults}; "
@@ -185,9 +171,7 @@ class Fitting:
             return [way]
         # Quotients by table are the same, bit for bit.
         ways = [by_table]
-        faults = self._pictures.faults(by_reciprocal)
-        self._tell(f"{self._name(by_reciprocal)}: {faults}")
-        if not isinstance(faults, str) and self._quality.admits(faults):
+        if self._is_good(by_reciprocal):
             ways.append(by_reciprocal)
         return ways
 
@@ -222,45 +206,52 @@ class Fitting:
         """A way to compute with all that scene and size ask for."""
         compiled, images = self._pictures.compiled(way.fmt)
         shader = None if way.shader is None else replace(compiled.needs, depth=depth)
-        return replace(way, shader=shader, stack_depth=max(image.stack_depth for image in images) or 1,
-                       index_width=max(8, *(image.index_width for image in images)),
-                       coord_width=max(4, max(self._pictures.size).bit_length()))
+        return self._numbered(replace(way, shader=shader, stack_depth=self._deepest(images),
+                                      coord_width=max(4, max(self._pictures.size).bit_length())))
+
+    @staticmethod
+    def _deepest(images):
+        return max(1, *(image.stack_depth for image in images))
+
+    def _numbered(self, config):
+        """A chip whose numbers are wide enough for its images, and whose caches are no larger than the memories."""
+        _, images = self._pictures.compiled(config.fmt, stack_depth=config.stack_depth)
+        width, default = max(8, *(image.index_width for image in images)), ChipConfig()
+        lines = {}
+        for name, items in CACHES.items():
+            whole = 1 << width - exact_log2(getattr(default, items) if items else 1)
+            lines[name] = min(getattr(default, name), whole)
+        return replace(config, index_width=width, **lines)
 
     def _faster(self, config):
         def cycles_of(chip):
             self._progress(f"drawing by the simulated chip, {chip.num_threads} threads")
             return self._clock.cycles(chip, _SMALL)
 
-        def is_good(chip):
-            faults = self._pictures.faults(chip)
-            return not isinstance(faults, str) and self._quality.admits(faults)
-
-        search = SpeedSearch(cycles_of, self._slower, is_good=is_good, tell=self._tell)
-        fitted = search.run(config)
-        first, small = search.tried[None], "×".join(map(str, _SMALL))
+        search = SpeedSearch(cycles_of, self._slower, is_good=self._is_good, tell=self._tell)
+        fitted = self._numbered(search.run(config))
         for name in search.knobs:
-            tried = {value: cycles for (knob, value), cycles in
-                     ((key, cycles) for key, cycles in search.tried.items() if key) if knob == name}
-            found = getattr(fitted, name)
-            words = "; ".join(f"{value}: {'not drawn well enough' if cycles is None else f'{cycles / first:.2f}'}"
-                              for value, cycles in tried.items())
-            if name == "stack_depth" and found == config.stack_depth:
-                continue
-            self._because(name, found, f"cycles at {small} over those of {config.num_threads} threads: {words}; "
-                          f"at most {self._slower:g}" if words else "the scene asks for no more")
-        self._timed = {"size": list(_SMALL), "first": first, "tried": [
-            {"parameter": key[0], "value": key[1], "cycles": cycles} for key, cycles in search.tried.items() if key]}
+            what = "depth of trees" if name == "stack_depth" else name
+            self._because(what, getattr(fitted, name), search.why(name, _SMALL))
+        self._timed = {"size": list(_SMALL), "first": search.first, "tried": [
+            {"parameter": name, "value": value, "cycles": cycles} for (name, value), cycles in search.tried.items()]}
         return fitted
+
+    def _is_good(self, chip):
+        faults = self._pictures.faults(chip)
+        return not isinstance(faults, str) and self._quality.admits(faults)
 
     def _smallest(self, config, ways):
         """Of the two most promising ways the one whose whole chip is smaller."""
         chips = [config]
         if len(ways) > 1:
-            whole = self._whole(ways[1], config.shader.depth if config.shader else 0)
-            chips.append(replace(config, fmt=whole.fmt, arithmetic=whole.arithmetic,
-                                 edge_tolerance=whole.edge_tolerance, index_width=whole.index_width,
-                                 stack_depth=min(whole.stack_depth, config.stack_depth)
-                                 if config.stack_depth < self._whole(ways[0], 0).stack_depth else whole.stack_depth))
+            # With a depth of trees that has been cut the other is cut alike.
+            _, images = self._pictures.compiled(ways[1].fmt, stack_depth=config.stack_depth)
+            chips.append(self._numbered(replace(config, fmt=ways[1].fmt, arithmetic=ways[1].arithmetic,
+                                                edge_tolerance=ways[1].edge_tolerance,
+                                                stack_depth=self._deepest(images))))
+            if not self._is_good(chips[1]):
+                chips.pop()
         areas = {chip: area_of(chip, name=f"the chip at {self._name(chip)}", progress=self._progress)
                  for chip in chips}
         for chip, area in areas.items():
@@ -268,38 +259,6 @@ class Fitting:
                        f"{area.ebr} block RAMs")
         self._whole_tables = {self._name(chip): area.lut for chip, area in areas.items()}
         return min(chips, key=lambda chip: areas[chip].lut)
-
-    def _explain(self, config, compiled, images):
-        search, fmt = self._search, config.fmt
-        narrower = [f"{exponent}.{fraction} {variant}: {faults}" for (exponent, fraction, variant), faults
-                    in search.tried.items() if exponent == fmt.exp_width and fraction == fmt.frac_width - 1]
-        self._because("fmt", str(fmt), "the next narrower: " + "; ".join(narrower) + f". {fmt.exp_width} exponent bits "
-                      "draw what 8 do" if narrower else "the narrowest that is tried")
-        why = "asked for by the format"
-        if getattr(self, "_whole_tables", None):
-            why = "tables of the whole chip: " + "; ".join(
-                f"{name}: {number:,}" for name, number in self._whole_tables.items())
-        self._because("arithmetic", ARITHMETICS[config.arithmetic].name, why)
-        self._because("edge_tolerance", config.edge_tolerance, "closes the cracks that are left" if
-                      config.edge_tolerance else "there are no cracks without")
-        if config.shader is not None:
-            on = [name for name in _SWITCHES if getattr(config.shader, name)]
-            self._because("shader", ", ".join(on), "what lights, materials and meshes of the scene have")
-            kinds = len(compiled.scene.lights)
-            self._because("lights", kinds or "at the eye", "they lie in memory, up to 256; their kinds are switches")
-        deepest = max(image.stack_depth for image in images)
-        self._because("second level", "unused" if compiled.is_flat else "used",
-                      "no mesh is there twice and nothing moves" if compiled.is_flat else
-                      "meshes are there more than once, or move")
-        if not any(reason.what == "stack_depth" for reason in self.reasons):
-            self._because("stack_depth", config.stack_depth, f"the deepest of the scene's kd-trees has {deepest} "
-                          "levels below its root, and no ray puts off more nodes than that, wherever it goes")
-        memories = {name: len(getattr(images[0], name)) for name in images[0].bytes_of_memories}
-        name = max(memories, key=memories.get)
-        self._because("index_width", config.index_width, f"the largest memory, {name}, has {memories[name]:,} items")
-        self._because("coord_width", config.coord_width, f"the picture has {max(self._pictures.size)} pixels a side")
-        self._because("caches", "default", "up to 512 lines of a cache take the same block RAMs")
-        self._because("memory", f"{images[0].num_bytes:,} bytes", f"{blocks_of(images[0])} block RAMs, if on the chip")
 
     # What it takes
 
@@ -337,6 +296,6 @@ class Fitting:
                                 for name, pair in self.figures.items()}
         for name, member in (("tables_of_datapaths", "_tables"), ("tables_of_chips", "_whole_tables"),
                              ("cycles", "_timed")):
-            if hasattr(self, member):
+            if getattr(self, member):
                 found[name] = getattr(self, member)
         return found

@@ -63,7 +63,7 @@ class Clockwork:
         return frame.report["cycles"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class SpeedSearch:
     """Takes away from a chip, one thing after the other, while it stays fast enough.
 
@@ -83,7 +83,9 @@ class SpeedSearch:
     Attributes
     ----------
     tried : dict
-        Cycles by (name, value), None of what does not draw well enough; of the chip at the beginning by None.
+        Cycles by (name, value), None of what does not draw well enough.
+    first : int
+        Cycles of the chip at the beginning.
     """
 
     cycles_of: object
@@ -92,10 +94,11 @@ class SpeedSearch:
     is_good: object = lambda config: True
     tell: object = print
     tried: dict = field(default_factory=dict)
+    first: int = 0
 
     def run(self, config):
         """The ChipConfig with less."""
-        self.tried[None] = first = self.cycles_of(config)
+        self.first = first = self.cycles_of(config)
         self.tell(f"{config.num_threads} threads, all of it: {first:,} cycles")
         for name, values in self.knobs.items():
             for value in values:
@@ -114,3 +117,11 @@ class SpeedSearch:
                     config = less
                     break
         return config
+
+    def why(self, name, size):
+        """What was found for a knob, in words."""
+        words = "; ".join(f"{value}: {f'{cycles / self.first:.2f}' if cycles else 'not drawn well enough'}"
+                          for (knob, value), cycles in self.tried.items() if knob == name)
+        small = "×".join(map(str, size))
+        return (f"cycles at {small} over those of all: {words}; at most {self.slower:g}" if words else
+                "the scene asks for no more")

@@ -1,9 +1,9 @@
 """Beyond what the chip's arithmetic fails: the limits of docs/accuracy.md, and what of a scene is beyond them.
 
-They are where rays begin to miss for more than the edges that leak everywhere ("bounds" in docs/results/stability.json,
-at 16 fraction bits): of the size of a mesh over its distance, the length of triangles over their width, and the scale of
-an instance along one axis. Each is the ratio of two lengths that meet in a number or a sum: rounding the greater to F
-bits leaves of the smaller 2^F over the ratio. So a limit doubles with every fraction bit.
+They are where rays begin to miss for more than the edges that leak everywhere, at 16 fraction bits ("bounds" in
+docs/results/stability.json): of the size of a mesh over its distance, the length of triangles over their width, and
+the scale of instances along one axis. Each is the ratio of two lengths that meet in a number or a sum: rounding the
+larger to F bits leaves of the smaller 2^F over the ratio. So a limit doubles with every fraction bit.
 """
 
 import math

@@ -69,7 +69,8 @@ def limits_of(case, failures):
 def bounds_of(case, rows):
     """The values round the easiest up to which hardly more rays fail, (lowest, highest).
 
-    Edges leak everywhere. Hardly more: of those that are decided, which must be a quarter, at most 5 in 100 more than at the easiest value.
+    Edges leak everywhere. Hardly more: of those that are decided, which must be a quarter, at most 5 in 100 more than
+    at the easiest value.
 
     Parameters
     ----------
