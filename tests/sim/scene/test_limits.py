@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 from fpu import FloatFormat
-from sim.scene import Material, load_scene
+from rtl.config import ChipConfig
+from sim.golden import render_golden
+from sim.model import render_model
+from sim.scene import Camera, Material, load_scene
+from sim.scene.compile import CompiledScene
 from sim.scene.limits import FAR, FLAT, STRETCHED, THIN, limit_warnings
 from tests.sim.golden.rooms import ball, quad, scene_of
 
@@ -95,3 +99,23 @@ def test_the_worst_are_named():
     scene = scene_of(FLOOR, *(ball((0.5, y, 0), 1e-5 * (y + 2), GREY, num_rings=3) for y in (0.5, 0.1, 0.2, 0.3, 0.4)))
     text, = limit_warnings(scene, fmt=FORMAT, is_flat=True)
     assert text.startswith("objects 'part2', 'part3', 'part4' and 2 more: up to ")
+
+
+def wrong_pixels(radius, fmt, *, flatten):
+    """Part of the model's pixels that show another triangle than golden's: a ball beside a floor, three radii away."""
+    middle = np.array((0.9, 0.37, 0.21))
+    scene = scene_of(FLOOR, ball(middle, radius, GREY, num_rings=12))
+    camera = Camera(middle + radius * np.array((3, 2, 1)), middle, (0, 0, 1), 40.0)
+    image = CompiledScene(scene, fmt=fmt, flatten=flatten).image(scene, eye=camera.eye)
+    drawn = render_model(image, camera, 160, 120, config=ChipConfig(fmt=fmt))
+    return drawn.differs_in_surface(render_golden(scene, camera, 160, 120)).mean()
+
+
+def test_the_limit_is_where_pictures_break_and_both_remedies_help():
+    within, at, beyond = (wrong_pixels(size, FORMAT, flatten=True) for size in (1e-1, 1 / FAR.ratio, 0.1 / FAR.ratio))
+    assert within < 0.001
+    assert 0.01 < at < 0.05
+    assert beyond > 0.1
+    assert wrong_pixels(0.1 / FAR.ratio, FORMAT, flatten=False) < 0.001
+    # Four bits more, a sixteenth of the size
+    assert at / 2 < wrong_pixels(1 / FAR.ratio / 16, FloatFormat(7, 20), flatten=True) < 2 * at
