@@ -1,6 +1,5 @@
 """``dynrt fit``: the smallest chip that draws a scene well enough."""
 
-import contextlib
 from pathlib import Path
 
 import click
@@ -12,10 +11,12 @@ from sim.scene import load_scene
 
 from .chip_file import chip_text
 from .engines import progress_on
-from .errors import BadInput, clear_errors, written_whole
+from .errors import BadInput, clear_errors
 from .fit_chip import Fitting
+from .fit_page import check_page, fitted_page
 from .options import CAMERA, QUALITY, SIZE, camera_of
 from .quality import Quality
+from .results import write_texts
 
 __all__ = ["fit"]
 
@@ -24,6 +25,9 @@ __all__ = ["fit"]
 @click.argument("scene")
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path),
               help="Chip's file to write, for render --chip  [default: the scene's name + -chip.json]")
+@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path),
+              help="Write the chip's file to results/ in this folder instead, as fit-NAME.json, and a row of the table in "
+              "its accuracy.md")
 @click.option("--quality", type=QUALITY, help="What a picture may have: wrong=PER CENT of pixels with "
               "another triangle than golden, cracks=NUMBER, phantoms=NUMBER, and must have: psnr=DB  "
               "[default: wrong=0.1,cracks=0]")
@@ -45,12 +49,17 @@ __all__ = ["fit"]
               help="Cycles from a memory request to its first word")
 @click.option("--area/--no-area", default=True, help="Synthesise the chip and the full one; some minutes each")
 @click.option("--place", is_flag=True, help="Place and route both, for the clock and frames a second; takes hours")
-def fit(scene, output, quality, size, camera, view, frames, shading, depth, flatten, engine, slower, latency, area,
-        place):
+def fit(scene, output, docs, quality, size, camera, view, frames, shading, depth, flatten, engine, slower, latency,
+        area, place):
     """Find the smallest chip that draws SCENE well enough, say why, and write it to a file."""
     if place and not area:
         raise click.UsageError("--place: what is placed has an area; leave --no-area out")
-    output = output or Path(f"{Path(scene).name.split('.')[0]}-chip.json")
+    name = Path(scene).name.split(".")[0]
+    if docs is not None:
+        if output is not None:
+            raise click.UsageError("-o: with --docs the file has its place; leave one of them out")
+        output = docs / "results" / f"fit-{name}{f'-{shading}' if shading else ''}.json"
+    output = output or Path(f"{name}-chip.json")
     if output.suffix.lower() != ".json":
         raise click.UsageError(f"-o: {output.name} must end in .json")
     if not output.parent.is_dir():
@@ -61,6 +70,9 @@ def fit(scene, output, quality, size, camera, view, frames, shading, depth, flat
         console.print(text, markup=False, soft_wrap=True)
 
     with clear_errors():
+        if docs is not None:
+            # Before the long work
+            check_page(docs)
         loaded = load_scene(scene)
         for warning in loaded.warnings:
             tell(f"warning: {warning}")
@@ -70,9 +82,12 @@ def fit(scene, output, quality, size, camera, view, frames, shading, depth, flat
             fitting = Fitting(loaded, poses, size=size, quality=quality or Quality(), shading=shading, depth=depth,
                               flatten=flatten, slower=slower, latency=latency, tell=tell, progress=progress)
             fitting.fit(has_clock=engine == "rtl", has_area=area, is_placed=place)
-        with contextlib.ExitStack() as files:
-            about = {"command": "dynrt fit", "scene": str(scene), "size": list(size), **fitting.about()}
-            files.enter_context(written_whole(output)).write_text(chip_text(fitting.config, about))
+        about = {"scene": name if docs else str(scene), "size": list(size), "engine": engine, "slower": slower,
+                 "latency": latency, **fitting.about()}
+        texts = {output: chip_text(fitting.config, about)}
+        if docs is not None:
+            texts[docs / "accuracy.md"] = fitted_page(docs, dict(texts))
+        write_texts(texts)
         _print(fitting)
         click.echo(f"{output}: draw with it by dynrt render {scene} --chip {output}")
 

@@ -111,6 +111,7 @@ class Fitting:
         if isinstance(faults, str) or not self._quality.admits(faults):
             raise BadInput(f"the chip that was found does not draw well enough: {faults}; "
                            "ask for more --quality than you need, to leave room")
+        self.image_bytes = images[0].num_bytes
         self._because("picture", str(faults), f"wanted: {self._quality}")
         self.faults = faults
         if has_area:
@@ -119,8 +120,6 @@ class Fitting:
             self._cycles()
         if is_placed:
             self._clocks(has_clock)
-
-    # Format and arithmetic
 
     def _ways(self, has_area):
         """Chips with a format and a way to compute that draw well enough, the most promising first."""
@@ -179,8 +178,6 @@ class Fitting:
     def _name(config):
         tolerant = f", tolerant {config.edge_tolerance}" if config.edge_tolerance else ""
         return f"{config.fmt}, {ARITHMETICS[config.arithmetic].name}{tolerant}"
-
-    # What the scene and the picture's size decide
 
     def _depth(self):
         pictures = self._pictures
@@ -260,8 +257,6 @@ class Fitting:
         self._whole_tables = {self._name(chip): area.lut for chip, area in areas.items()}
         return min(chips, key=lambda chip: areas[chip].lut)
 
-    # What it takes
-
     def _areas(self, blocks):
         names = {"tables": "lut", "flip-flops": "ff", "multipliers": "dsp", "block RAMs": "ebr"}
         areas = [area_of(chip, name=name, progress=self._progress)
@@ -289,7 +284,8 @@ class Fitting:
 
     def about(self):
         """What is kept beside the chip in its file."""
-        found = {"quality": str(self._quality), "picture": asdict(self.faults),
+        found = {"shading": self._pictures.shading, "depth": self._pictures.depth, "image_bytes": self.image_bytes,
+                 "quality": str(self._quality), "picture": asdict(self.faults),
                  "because": [asdict(reason) for reason in self.reasons], "formats": self.tried}
         if self.figures:
             found["figures"] = {name: dict(zip(("chip", "full"), pair, strict=True))

@@ -2,7 +2,9 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -25,6 +27,7 @@ from tools.fit_pictures import Pictures
 from tools.fit_speed import SpeedSearch
 from tools.quality import Faults, Quality
 
+DOCS = Path(__file__).parents[2] / "docs"
 FINE, CRACKED = (Faults(wrong=0.0, cracks=cracks, phantoms=0, psnr=50.0) for cracks in (0, 1))
 #: A box's corner, seen from outside.
 CORNER = ("v 0 0 0\nv 3 0 0\nv 0 3 0\nv 0 0 3\nv 0.2 0.3 0.1\nv 1.4 0.3 0.3\nv 0.3 1.3 0.5\n"
@@ -35,8 +38,6 @@ def run(*arguments):
     result = CliRunner().invoke(main, [str(argument) for argument in arguments])
     return result.exit_code, re.sub(r"\s+", " ", result.output)
 
-
-# Quality
 
 @pytest.mark.parametrize(("text", "shown", "admits"), [
     ("wrong=0.5", "wrong ≤ 0.5 %, cracks ≤ 0", (True, False)),
@@ -59,8 +60,6 @@ def test_what_is_no_quality(tmp_path, text, says):
     code, said = run("fit", "room", "--quality", text, "-o", tmp_path / "x.json")
     assert (code, says in said, list(tmp_path.iterdir())) == (2, True, [])
 
-
-# Formats
 
 def searched(good, **options):
     """A search in which pictures are fine where ``good(exponent, fraction, variant)``."""
@@ -109,8 +108,6 @@ def test_what_comes_nearest():
     assert search.best()[2] == CRACKED
 
 
-# Threads and more
-
 def test_less_of_everything_while_it_is_fast_enough():
     def cycles(config):
         return 6400 // config.num_threads * (1 + (config.num_fetches == 1))
@@ -136,8 +133,6 @@ def test_a_shallower_tree_must_draw_as_well():
     assert search.run(ChipConfig()).stack_depth == 16
     assert search.tried["stack_depth", 8] is None
 
-
-# What the scene needs
 
 GREY = Material("grey", (0.5, 0.5, 0.5))
 FLOOR = quad([(-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0)], GREY)
@@ -177,8 +172,6 @@ def test_all_numbers_fit_and_none_is_no_triangle():
                                 "objects out or build a chip with a wider index_width")
 
 
-# Files of chips
-
 def test_a_chip_comes_back_from_its_file(tmp_path):
     config = ChipConfig(fmt=FloatFormat(6, 14), num_threads=16, edge_tolerance=2,
                         shader=ShaderFeatures(refraction=False, depth=2))
@@ -213,8 +206,6 @@ def test_files_that_are_no_chips(tmp_path, text, says):
     code, said = run("render", "room", "--chip", path, "-o", tmp_path / "x.png")
     assert (code, says in said, [*tmp_path.iterdir()]) == (2, True, [path])
 
-
-# The command
 
 @pytest.fixture
 def corner(tmp_path):
@@ -326,6 +317,7 @@ def test_what_no_chip_draws(tmp_path, corner):
     (["room", "--place", "--no-area"], "--place: what is placed has an area; leave --no-area out"),
     (["room", "--view", "7"], "--view: there is no camera 7, the scene has cameras 0 to 0"),
     (["none.obj"], "none.obj: No such file or directory"),
+    (["room", "-o", "x.json", "--docs", "."], "-o: with --docs the file has its place; leave one of them out"),
     (["room", "--slower", "0.5"], "0.5 is not in the range x>=1")])
 def test_bad_options(tmp_path, monkeypatch, arguments, says):
     monkeypatch.chdir(tmp_path)
@@ -371,3 +363,47 @@ def test_pictures_say_what_does_not_fit():
     pictures = Pictures(scene, [(scene, scene.default_camera())], (8, 6), shading="simple")
     assert isinstance(pictures.faults(ChipConfig(fmt=FloatFormat(2, 4))), str | Faults)
     assert pictures.faults(ChipConfig()).cracks == 0
+
+
+@pytest.fixture
+def docs(tmp_path):
+    folder = tmp_path / "docs"
+    (folder / "results").mkdir(parents=True)
+    shutil.copy(DOCS / "accuracy.md", folder)
+    return folder
+
+
+def test_a_row_of_the_page(docs, corner):
+    code, said = run("fit", corner, *VIEW, "--engine", "model", "--no-area", "--docs", docs, "--shading", "simple")
+    assert code == 0, said
+    path = docs / "results" / "fit-corner-simple.json"
+    config, about = chip_of(path), json.loads(path.read_text())["about"]
+    row = next(line for line in (docs / "accuracy.md").read_text().splitlines() if line.startswith("| corner |"))
+    way = f"{ARITHMETICS[config.arithmetic].name}, {config.edge_tolerance}"
+    assert row == (f"| corner | 32×24 | {config.fmt} | {way} | none | 64 | {config.stack_depth} | "
+                   f"{about['picture']['wrong']:.3f} % wrong, 0 cracks | – | – | – | – | – | "
+                   f"{about['image_bytes'] / 1024:.0f} | – | – | – |")
+
+
+@pytest.mark.parametrize(("spoil", "says"), [
+    (lambda docs: (docs / "accuracy.md").write_text("nothing"), "accuracy.md: must have the lines '<!-- begin: fit "
+     "-->' and '<!-- end: fit -->' once, for the table between them"),
+    (lambda docs: (docs / "results" / "fit-x.json").write_text("{}"), "fit-x.json: is not what dynrt fit writes; fit "
+     "that scene anew, or remove it")])
+def test_pages_that_cannot_be_filled(docs, corner, spoil, says):
+    spoil(docs)
+    before = {path: path.read_bytes() for path in docs.rglob("*") if path.is_file()}
+    code, said = run("fit", corner, *VIEW, "--engine", "model", "--no-area", "--docs", docs)
+    assert code == 2
+    assert says in said
+    assert {path: path.read_bytes() for path in docs.rglob("*") if path.is_file()} == before
+
+
+def test_committed_chips_are_what_they_say():
+    for path in (DOCS / "results").glob("fit-*.json"):
+        config, about = chip_of(path), json.loads(path.read_text())["about"]
+        assert Quality().admits(Faults(**about["picture"]))
+        assert about["figures"]["tables"]["chip"] < about["figures"]["tables"]["full"]
+        assert (config.shader is None) == (about["shading"] == "simple")
+    room = json.loads((DOCS / "results" / "fit-room.json").read_text())["about"]["figures"]["tables"]
+    assert room["chip"] <= room["full"] / 2
