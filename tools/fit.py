@@ -26,8 +26,8 @@ __all__ = ["fit"]
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path),
               help="Chip's file to write, for render --chip  [default: the scene's name + -chip.json]")
 @click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path),
-              help="Write the chip's file to results/ in this folder instead, as fit-NAME.json, and a row of the table in "
-              "its accuracy.md")
+              help="Write the chip's file to results/ in this folder instead, as fit-NAME.json, and a row of the table "
+              "in its accuracy.md")
 @click.option("--quality", type=QUALITY, help="What a picture may have: wrong=PER CENT of pixels with "
               "another triangle than golden, cracks=NUMBER, phantoms=NUMBER, and must have: psnr=DB  "
               "[default: wrong=0.1,cracks=0]")
