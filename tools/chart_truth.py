@@ -30,11 +30,13 @@ class Truth:
     scene : Scene
     camera : Camera
     size : (int, int)
+    shading, depth
+        Of golden's picture, see :func:`~sim.golden.render_golden`.
     """
 
-    def __init__(self, scene, camera, size):
+    def __init__(self, scene, camera, size, *, shading="full", depth=DEPTH):
         self._scene, self._camera, self._size = scene, camera, size
-        self.golden = render_golden(scene, camera, *size, shading="full", depth=DEPTH)
+        self.golden = render_golden(scene, camera, *size, shading=shading, depth=depth)
         self._around = np.stack([render(scene, camera, *size, shift=(x * _REACH, y * _REACH)).t for x, y in AROUND])
 
     def measure(self, fmt, variants):
@@ -55,8 +57,22 @@ class Truth:
         except OverflowError as error:
             return {"error": str(error)}
         golden = self.golden
-        pixels = golden.t.size
-        wrong = drawn.differs_in_surface(golden)
+        pixels, wrong, found = golden.t.size, drawn.differs_in_surface(golden), drawn.prim_id >= 0
+        with np.errstate(invalid="ignore"):
+            error = np.abs(drawn.t / golden.t - 1)[(golden.prim_id >= 0) & found & ~wrong]
+        part = np.quantile(error, (0.5, 0.999, 1.0)) if error.size else np.full(3, math.nan)
+        counts = drawn.report["counts"]
+        return {
+            **self.faults(drawn),
+            **{f"t_err_{name}": float(f"{value:.3g}") for name, value in zip(("median", "p999", "max"), part,
+                                                                             strict=True)},
+            "psnr": self.psnr(drawn), "flip": round(flip(golden.color, drawn.color), 4),
+            "steps_per_pixel": round(counts["steps"] / pixels, 2),
+            "triangle_tests_per_pixel": round(counts["triangle_tests"] / pixels, 2)}
+
+    def faults(self, drawn):
+        """``wrong_percent``, ``cracks`` and ``phantoms`` of a picture."""
+        golden = self.golden
         expected, found = golden.prim_id >= 0, drawn.prim_id >= 0
         # What golden has at this distance within the reach is an outline, which any rounding moves.
         with np.errstate(invalid="ignore"):
@@ -64,14 +80,9 @@ class Truth:
                 ~found & np.isinf(self._around).any(axis=0))
             farther = expected & (~found | (drawn.t > golden.t * (1 + _SAME)))
             nearer = found & (~expected | (drawn.t < golden.t * (1 - _SAME)))
-            error = np.abs(drawn.t / golden.t - 1)[expected & found & ~wrong]
-        part = np.quantile(error, (0.5, 0.999, 1.0)) if error.size else np.full(3, math.nan)
-        counts = drawn.report["counts"]
-        return {
-            "wrong_percent": round(100 * float(wrong.mean()), 4), "cracks": int((farther & ~known).sum()),
-            "phantoms": int((nearer & ~known).sum()),
-            **{f"t_err_{name}": float(f"{value:.3g}") for name, value in zip(("median", "p999", "max"), part,
-                                                                             strict=True)},
-            "psnr": round(psnr(drawn.color, golden.color), 2), "flip": round(flip(golden.color, drawn.color), 4),
-            "steps_per_pixel": round(counts["steps"] / pixels, 2),
-            "triangle_tests_per_pixel": round(counts["triangle_tests"] / pixels, 2)}
+        return {"wrong_percent": round(100 * float(drawn.differs_in_surface(golden).mean()), 4),
+                "cracks": int((farther & ~known).sum()), "phantoms": int((nearer & ~known).sum())}
+
+    def psnr(self, drawn):
+        """Of a picture in dB."""
+        return round(psnr(drawn.color, self.golden.color), 2)

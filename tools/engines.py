@@ -11,6 +11,8 @@ from sim.machine import render_frames, render_pysim, render_rtl
 from sim.model import render_full, render_model
 from sim.scene.slots import upload_report
 
+from .errors import BadInput
+
 __all__ = ["ENGINES", "Order", "draw", "model_picture", "progress_on"]
 
 ENGINES = ("golden", "model", "rtl", "pysim")
@@ -27,7 +29,7 @@ class Order:
     size : (int, int)
         Width and height in pixels.
     config : ChipConfig
-        The chip; with full shading it gets the shader that the scene needs.
+        The chip; for full shading without a shader it gets the one that the scene needs.
     shading : str
         ``"simple"`` or ``"full"``.
     depth : int
@@ -59,10 +61,21 @@ class Order:
         return self.shading == "full"
 
     def chip_for(self, compiled):
-        """The chip that draws a CompiledScene: with full shading one whose shader does what it needs, and no more."""
+        """The chip that draws a CompiledScene: with full shading its own shader, or one that does what is needed.
+
+        Raises
+        ------
+        BadInput
+            If its own does not.
+        """
         if not self.is_full:
             return self.config
-        return replace(self.config, shader=replace(compiled.needs, depth=self.depth))
+        if self.config.shader is None:
+            return replace(self.config, shader=replace(compiled.needs, depth=self.depth))
+        if missing := self.config.shader.missing(compiled.needs):
+            raise BadInput(f"--chip: the chip's shader lacks what the scene needs: {', '.join(missing)}; fit a chip to "
+                           "the scene with dynrt fit")
+        return self.config
 
 
 @contextlib.contextmanager

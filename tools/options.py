@@ -10,7 +10,12 @@ from fpu import FloatFormat
 from rtl.config import ChipConfig
 from sim.scene import Camera, SceneError
 
-__all__ = ["CAMERA", "CHIP", "CYCLES", "FORMAT", "PIXEL", "SIZE", "chip_config", "docs_option", "scenes_option"]
+from .chip_file import chip_of
+from .errors import BadInput
+from .quality import Quality
+
+__all__ = ["CAMERA", "CHIP", "CYCLES", "FORMAT", "PIXEL", "QUALITY", "SIZE", "camera_of", "chip_config", "docs_option",
+           "scenes_option"]
 
 
 class _Parsed(click.ParamType):
@@ -52,6 +57,8 @@ _PARAMETERS = {field.name for field in fields(ChipConfig)} - {"fmt", "shader"}
 
 
 def _chip(text):
+    if text.endswith(".json"):
+        return Path(text)
     name, _, value = text.partition("=")
     if name not in _PARAMETERS:
         raise ValueError(f"'{name}' is not a parameter of the chip; there are {', '.join(sorted(_PARAMETERS))}")
@@ -65,7 +72,8 @@ PIXEL = _Parsed("X,Y", _pixel)
 CYCLES = _Parsed("FIRST:LAST", _cycles)
 CAMERA = _Parsed("NUMBERS", Camera.parse)
 FORMAT = _Parsed("E.F", FloatFormat.parse)
-CHIP = _Parsed("NAME=NUMBER", _chip)
+QUALITY = _Parsed("NAME=BOUND,...", Quality.parse)
+CHIP = _Parsed("NAME=NUMBER|FILE.json", _chip)
 
 
 _FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
@@ -79,8 +87,44 @@ def docs_option(what):
 
 
 def chip_config(fmt, parameters):
-    """The chip with this format and these parameters, a list of (name, value)."""
+    """The chip that is asked for.
+
+    Parameters
+    ----------
+    fmt : FloatFormat or None
+        Of the chip, over that of its file; default 7.16.
+    parameters : list
+        Parameters (name, value) over those of a chip's file, whose Path may be among them.
+
+    Raises
+    ------
+    BadInput, UsageError
+        If the file cannot be used, there are two, or a parameter is out of its range.
+    """
+    files = [given for given in parameters if isinstance(given, Path)]
+    if len(files) > 1:
+        raise click.UsageError(f"--chip: {files[0]} and {files[1]} are two chips; name one file")
+    config = chip_of(files[0]) if files else ChipConfig()
     try:
-        return replace(ChipConfig(), fmt=fmt, **dict(parameters))
+        changed = dict(given for given in parameters if given not in files)
+        return replace(config, **({"fmt": fmt} if fmt else {}), **changed)
     except ValueError as error:
         raise click.UsageError(f"--chip: {error}") from error
+
+
+def camera_of(scene, camera, view):
+    """The Camera that ``--camera`` and ``--view`` ask for.
+
+    Raises
+    ------
+    BadInput
+        If the scene has no such view.
+    """
+    if camera is not None:
+        return camera
+    if view is None:
+        return scene.default_camera()
+    if view >= len(scene.cameras):
+        have = f"cameras 0 to {len(scene.cameras) - 1}" if scene.cameras else "no cameras; use --camera"
+        raise BadInput(f"--view: there is no camera {view}, the scene has {have}")
+    return scene.cameras[view]

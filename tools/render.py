@@ -9,16 +9,17 @@ import click
 import numpy as np
 from rich.console import Console
 
-from fpu import FloatFormat
+from fpu.reciprocal import MAX_FRAC_WIDTH
 from sim.golden import MAX_DEPTH, SHADINGS, psnr, render_golden
 from sim.scene import Sky, load_scene
 from sim.scene.compile import CompiledScene
+from sim.scene.limits import limit_warnings
 from sim.scene.texture import decode_texture
 
 from .animation import frame_durations, save_animation, save_picture
 from .engines import ENGINES, Order, draw, model_picture, progress_on
 from .errors import BadInput, clear_errors, written_whole
-from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, chip_config
+from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, camera_of, chip_config
 
 __all__ = ["render"]
 
@@ -34,16 +35,16 @@ _CHECKED_PIXELS = 1 << 21
               help="golden: float64 ray tracer; model: the chip without a clock; rtl: the Verilated chip; pysim: the "
               "chip in Amaranth's simulator")
 @click.option("--size", type=SIZE, default="512x384", show_default=True)
-@click.option("--format", "fmt", type=FORMAT, default=str(FloatFormat(7, 16)), show_default=True,
-              help="The chip's floats: exponent and fraction bits")
+@click.option("--format", "fmt", type=FORMAT, help="The chip's floats: exponent and fraction bits  [default: the chip "
+              "file's, else 7.16]")
 @click.option("--camera", type=CAMERA, help="eye x,y,z, look-at x,y,z, up x,y,z, horizontal field of view in degrees")
 @click.option("--view", type=click.IntRange(min=0), help="Number of a camera in the scene's file  [default: the first]")
 @click.option("--frames", type=click.IntRange(min=1), help="Draw so many pictures of an animated scene: "
               "NAME-0000.png and so on, and an animation, NAME.png or NAME.gif; a report has a list")
-@click.option("--shading", type=click.Choice(SHADINGS), default="simple", show_default=True, help="simple: colour "
-              "times cosine; full: lights, shadows, textures, reflection, refraction")
+@click.option("--shading", type=click.Choice(SHADINGS), help="simple: colour times cosine; full: lights, shadows, "
+              "textures, reflection, refraction  [default: full by a chip file with a shader, else simple]")
 @click.option("--depth", type=click.IntRange(0, MAX_DEPTH), help="Generations of secondary rays of full shading  "
-              "[default: 4]")
+              "[default: the chip file's, else 4]")
 @click.option("--sky", type=click.Path(dir_okay=False, path_type=Path), help="Panorama (equirectangular picture) "
               "round the scene, for full shading  [default: the scene's own, else the background]")
 @click.option("--background", type=click.IntRange(0, 255), nargs=3, default=(0, 0, 0), show_default=True,
@@ -52,7 +53,8 @@ _CHECKED_PIXELS = 1 << 21
               "each instance  [default: flatten if nothing moves and no mesh is there twice]")
 @click.option("--center", type=click.Choice(["eye", "scene"]), default="eye", show_default=True,
               help="Where the chip's numbers are finest, of a scene of instances")
-@click.option("--chip", "parameters", type=CHIP, multiple=True, help="A parameter of the chip, see rtl/config.py")
+@click.option("--chip", "parameters", type=CHIP, multiple=True, help="A parameter of the chip, see "
+              "rtl/config.py, or a file with them, such as dynrt fit writes")
 @click.option("--latency", type=click.IntRange(1, 1000), default=4, show_default=True,
               help="Cycles from a memory request to its first word")
 @click.option("--jitter", type=click.IntRange(0, 1000), default=0, show_default=True,
@@ -69,10 +71,14 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
            center, parameters, latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
     """Draw SCENE: an .obj, .ply, .ply.gz, .gltf, .glb or .md3 file, a map in a .pk3 (FILE.pk3, or FILE.pk3:MAP where it
     has several), or a built-in one: room, mirror-room, vpl, walk or sunflowers."""
-    _check_shading(engine, shading, depth, sky, hits)
-    order = Order(engine=engine, size=size, config=chip_config(fmt, parameters), shading=shading,
-                  depth=4 if depth is None else depth, background=background, latency=latency, jitter=jitter,
-                  seed=seed, wave=wave, wave_cycles=wave_cycles, wave_pixels=wave_pixels)
+    config = chip_config(fmt, parameters)
+    shading = shading or ("simple" if config.shader is None else "full")
+    _check_shading(engine, shading, depth, sky, hits, config)
+    if depth is None:
+        depth = 4 if config.shader is None else config.shader.depth
+    order = Order(engine=engine, size=size, config=config, shading=shading, depth=depth, background=background,
+                  latency=latency, jitter=jitter, seed=seed, wave=wave, wave_cycles=wave_cycles,
+                  wave_pixels=wave_pixels)
     output = output or Path(f"{Path(scene).name.split('.')[0]}.png")
     _check_options(order, output, frames, hits)
     for path in (output, wave, hits, report):
@@ -81,7 +87,7 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
     console = Console(stderr=True, highlight=False)
     with clear_errors(), contextlib.ExitStack() as files:
         loaded = load_scene(scene)
-        chosen = _camera(loaded, camera, view)
+        chosen = camera_of(loaded, camera, view)
         if sky is not None:
             loaded = replace(loaded, sky=_panorama(sky, chosen))
         if frames and not loaded.is_animated:
@@ -91,15 +97,15 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
         compiled = None
         if engine != "golden":
             with progress_on(console, "building kd-trees"):
-                compiled = CompiledScene(loaded, fmt=fmt, stack_depth=order.config.stack_depth,
+                compiled = CompiledScene(loaded, fmt=config.fmt, stack_depth=order.config.stack_depth,
                                          index_width=order.config.index_width, flatten=flatten,
                                          from_eye=center == "eye")
-        for warning in [*loaded.warnings, *(compiled.warnings if compiled else [])]:
+        for warning in [*loaded.warnings, *(_chip_warnings(compiled, order, center) if compiled else [])]:
             console.print(f"warning: {warning}", markup=False)
         if wave:
             order = replace(order, wave=files.enter_context(written_whole(wave)))
 
-        poses = [(posed, chosen if camera is not None else _camera(posed, None, view))
+        poses = [(posed, chosen if camera is not None else camera_of(posed, None, view))
                  for posed in map(loaded.at_time, times)]
         chip = order.config if compiled is None else order.chip_for(compiled)
         drawn = []
@@ -128,11 +134,24 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
                 json.dumps(reports if frames else reports[0], indent=1) + "\n")
 
 
+def _chip_warnings(compiled, order, center):
+    # Roots go by table, which simulated chips with full shading need.
+    most_bits = {"most_bits": MAX_FRAC_WIDTH} if order.is_full and order.engine != "model" else {}
+    return [*compiled.warnings, *limit_warnings(compiled.scene, fmt=order.config.fmt, is_flat=compiled.is_flat,
+                                                from_eye=center == "eye", **most_bits)]
+
+
 def _is_gif(path):
     return path.suffix.lower() == ".gif"
 
 
-def _check_shading(engine, shading, depth, sky, hits):
+def _check_shading(engine, shading, depth, sky, hits, config):
+    if shading == "simple" and config.shader is not None and engine != "golden":
+        raise click.UsageError("--shading: the chip of --chip has a shader, which draws full shading; leave --shading "
+                               "out, or write \"shader\": null in the file")
+    if config.shader is not None and depth not in (None, config.shader.depth):
+        raise click.UsageError(f"--depth: the chip of --chip is built for {config.shader.depth} generations; leave "
+                               "--depth out")
     if depth is not None and shading != "full":
         raise click.UsageError("--depth is of full shading; use --shading full")
     if hits is not None and shading == "full" and engine in ("rtl", "pysim"):
@@ -168,17 +187,6 @@ def _check_options(order, output, frames, hits):
             raise click.UsageError(f"--wave-pixel: {x},{y} is outside of the picture of {width}x{height}")
     if hits is not None and frames and frames > 1:
         raise click.UsageError("--hits is of one picture; leave --frames out")
-
-
-def _camera(scene, camera, view):
-    if camera is not None:
-        return camera
-    if view is None:
-        return scene.default_camera()
-    if view >= len(scene.cameras):
-        have = f"cameras 0 to {len(scene.cameras) - 1}" if scene.cameras else "no cameras; use --camera"
-        raise BadInput(f"--view: there is no camera {view}, the scene has {have}")
-    return scene.cameras[view]
 
 
 def _panorama(path, camera):

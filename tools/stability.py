@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from sim.methods import METHODS
-from sim.stability.cases import CASES, limits_of
+from sim.stability.cases import CASES, DECIDED, bounds_of, limits_of
 from sim.stability.truth import BLUR
 
 from .costs import measured_luts
@@ -23,8 +23,6 @@ from .stability_plots import draw_plots
 __all__ = ["measured", "stability"]
 
 _NUM_RAYS = 10_000
-#: The least part of the rays of a value that must be decided for it to say anything.
-_DECIDED = 0.25
 
 
 def _row(method, case, value, probe, verdict):
@@ -63,10 +61,17 @@ def _limits(rows):
     for case in CASES.values():
         of_case = [row for row in rows if row["case"] == case.name]
         for method in dict.fromkeys(row["method"] for row in of_case):
-            failures = {row["parameter"]: row["failures"] or row["decided"] < _DECIDED * row["rays"]
+            failures = {row["parameter"]: row["failures"] or row["decided"] < DECIDED * row["rays"]
                         for row in of_case if row["method"] == method}
             found.setdefault(case.name, {})[method] = limits_of(case, failures)
     return found
+
+
+def _bounds(rows):
+    """By case and method, between which values hardly more fails than at the easiest."""
+    return {name: {method: bounds_of(case, [row for row in rows if row["case"] == name and row["method"] == method])
+                   for method in dict.fromkeys(row["method"] for row in rows if row["case"] == name)}
+            for name, case in CASES.items()}
 
 
 def _methods(fmt, luts):
@@ -111,7 +116,7 @@ def stability(docs, only, rays, fmt, jobs):
         rows.sort(key=lambda row: order[row["case"]])
         luts = measured_luts(docs / "results" / "fpu.json", fmt=fmt) if str(fmt) == "7.16" else None
         results = {"format": str(fmt), "blur": BLUR, "methods": _methods(fmt, luts), "limits": _limits(rows),
-                   "rows": rows}
+                   "bounds": _bounds(rows), "rows": rows}
         text = filled_page(page, PARTS, results)
         for folder in (path.parent, docs / "pictures"):
             folder.mkdir(exist_ok=True)

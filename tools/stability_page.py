@@ -45,19 +45,28 @@ def _rates(results):
                            for case, of in found.items()])
 
 
-def _limits(results):
-    def between(limit):
-        if limit is None:
-            return "none"
-        low, high = limit
-        return f"{low:g}" if low == high else f"{low:g} … {high:g}"
+def _between(limit):
+    if limit is None:
+        return "none"
+    low, high = limit
+    return f"{low:g}" if low == high else f"{low:g} … {high:g}"
 
+
+def _ranges(results, kind, methods=SHOWN):
     rows = []
-    for name, of in results.get("limits", {}).items():
+    for name, of in results.get(kind, {}).items():
         case = CASES[name]
-        rows.append([name, case.parameter, between((case.values[0], case.values[-1])),
-                     *(between(of[method]) if method in of else "" for method in SHOWN)])
-    return markdown_table(["case", "parameter", "tried", *SHOWN], rows)
+        rows.append([name, case.parameter, _between((case.values[0], case.values[-1])),
+                     *(_between(of[method]) if method in of else "" for method in methods)])
+    return markdown_table(["case", "parameter", "tried", *methods], rows)
+
+
+def _limits(results):
+    return _ranges(results, "limits")
+
+
+def _bounds(results):
+    return _ranges(results, "bounds")
 
 
 def _kinds(results):
@@ -72,4 +81,4 @@ def _kinds(results):
                            if any(numbers[1:])])
 
 
-PARTS = {"methods": _methods, "rates": _rates, "limits": _limits, "kinds": _kinds}
+PARTS = {"methods": _methods, "rates": _rates, "limits": _limits, "bounds": _bounds, "kinds": _kinds}

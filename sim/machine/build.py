@@ -108,6 +108,8 @@ def _build(config, trace, work, progress):
     progress("writing Verilog")
     try:
         (work / "chip.v").write_text(component_verilog(DynRTC(config), name="dynrtc"))
+    except ValueError as error:
+        raise BuildError(f"such a chip cannot be built: {error}") from error
     except YosysError as error:
         raise BuildError(f"yosys failed: {error}") from error
     progress("translating to C++")

@@ -32,6 +32,12 @@ class _Static:
     first_light: int
 
 
+def _check_number(name, number, most):
+    if number > most:
+        raise SceneError(f"scene needs {number:,} {name}, more than the {most:,} that the chip's memory addresses; "
+                         "leave objects out or build a chip with a wider index_width")
+
+
 def _even(number):
     return number + number % 2
 
@@ -135,6 +141,11 @@ class CompiledScene:
         first, count = self._top_level(self._scene), len(self._shown)
         return MemoryLayout(2, count, _even(max(_HEADROOM * first.num_nodes, 2 * count)),
                             max(_HEADROOM * first.num_entries, 2 * count))
+
+    @property
+    def scene(self):
+        """The Scene that was compiled."""
+        return self._scene
 
     @property
     def needs(self):
@@ -285,10 +296,10 @@ class CompiledScene:
         nodes, lists = np.concatenate(node_words), np.concatenate(list_words)
         fields = fmt.encode(np.concatenate(matrices)).reshape(-1, 12)
         limit = 1 << self._index_width
-        for name, words in (("kd-tree nodes", nodes), ("list entries", lists), ("matrices", fields)):
-            if len(words) > limit:
-                raise SceneError(f"scene needs {len(words):,} {name}, more than the {limit:,} that the chip's memory "
-                                 f"addresses; leave objects out or build a chip with a wider index_width")
+        # The last number stands for no triangle.
+        for name, words, most in (("kd-tree nodes", nodes, limit), ("list entries", lists, limit),
+                                  ("matrices", fields, limit - 1)):
+            _check_number(name, len(words), most)
         image = SceneImage(
             fmt=fmt, root=0, nodes=nodes, lists=lists, matrices=pack_fields(fields, fmt.width),
             shading=np.concatenate(shading), num_instances=count, stack_depth=0,
@@ -299,6 +310,8 @@ class CompiledScene:
             return _Static(layout, background, image, 0)
         records, texels, first_light = shading_records(self._scene, image, parts=shaded, background=background,
                                                        num_slots=layout.num_slots)
+        for name, words in (("records of shading", records), ("texels", texels)):
+            _check_number(name, len(words), limit)
         image = replace(image, records=pack_fields(records, lane_width(fmt)), texels=texels,
                         needs=self.needs,
                         stats={**image.stats, "records": len(records), "texels": len(texels)})

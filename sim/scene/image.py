@@ -118,6 +118,12 @@ class SceneImage:
         return sum(self.bytes_of_memories.values())
 
     @property
+    def index_width(self):
+        """Bits of an item's number in the largest memory; all ones, which stands for no triangle, is none's."""
+        largest = max(len(memory) for memory in self._memories().values())
+        return max((largest - 1).bit_length(), len(self.matrices).bit_length())
+
+    @property
     def checksum(self):
         """CRC-32 of all memories."""
         crc = 0

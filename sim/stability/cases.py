@@ -1,5 +1,6 @@
 """The cases: what is swept, and the rays and triangles for each value of it."""
 
+import math
 from dataclasses import dataclass
 from functools import partial
 
@@ -7,7 +8,12 @@ import numpy as np
 
 from . import chip, probes
 
-__all__ = ["CASES", "Case", "limits_of"]
+__all__ = ["CASES", "DECIDED", "Case", "bounds_of", "limits_of"]
+
+#: The least part of the rays of a value that must be decided for it to say anything.
+DECIDED = 0.25
+#: Of the decided rays, how many more may fail than at the easiest value.
+_MORE = 0.05
 
 
 @dataclass(frozen=True)
@@ -58,6 +64,28 @@ def limits_of(case, failures):
     while high + 1 < len(case.values) and not failures[case.values[high + 1]]:
         high += 1
     return case.values[low], case.values[high]
+
+
+def bounds_of(case, rows):
+    """The values round the easiest up to which hardly more rays fail, (lowest, highest).
+
+    Edges leak everywhere. Hardly more: of those that are decided, which must be a quarter, at most 5 in 100 more than
+    at the easiest value.
+
+    Parameters
+    ----------
+    case : Case
+    rows : list of dict
+        A method's at each of the case's values: ``parameter``, ``rays``, ``failures``, ``decided``.
+
+    Returns
+    -------
+    (float, float) or None
+        None if too few are decided at the easiest.
+    """
+    shares = {row["parameter"]: row["failures"] / row["decided"] if row["decided"] >= DECIDED * row["rays"]
+              else math.inf for row in rows}
+    return limits_of(case, {value: share > min(shares[case.easiest], 1) + _MORE for value, share in shares.items()})
 
 
 _TRIANGLES = 32, 288, 2592, 23328, 83232

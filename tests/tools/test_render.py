@@ -345,6 +345,21 @@ def test_warnings_name_dropped_triangles(tmp_path):
     assert "2 degenerate triangles dropped" in result.output
 
 
+def test_what_is_beyond_the_arithmetic_is_named_once(tmp_path):
+    blade = ("o blade\nv 0 0 0\nv 1 0 0\nv 0 0.00006 0\nf -3 -2 -1\n"
+             "o floor\nv -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nf -3 -2 -1\n")
+    for shading in ("simple", "full"):
+        result = run("render", obj(tmp_path, blade), "-o", tmp_path / "x.png", "--engine", "model", "--size", "8x8",
+                     "--shading", shading)
+        assert result.exit_code == 0
+        said = re.sub(r"\s+", " ", result.output)
+        assert said.count("warning: mesh 'blade': triangles up to 16,667 times as long as wide, beyond the 10,000 that "
+                          "format 7.16 is good for; use --format 7.17, or split them into shorter ones") == 1
+    result = run("render", obj(tmp_path, blade), "-o", tmp_path / "x.png", "--engine", "model", "--size", "8x8",
+                 "--format", "7.17")
+    assert "warning" not in result.output
+
+
 def test_compressed_ply(tmp_path):
     text = ("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
             "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
