@@ -33,7 +33,7 @@ class MailboxedList(wiring.Component):
 
     Members
     -------
-    begin : ``{"valid", "thread"}``: the thread begins a new packet, whose first entry comes 4 cycles later at the
+    begin : ``{"valid", "thread"}``: the thread begins a new packet, whose first entry comes 5 cycles later at the
         earliest
     leaf : stream of ``{"token", "list"}``: a leaf to walk
     tested, left : streams of tokens: the job of the thread's last triangle is done; the instance has been left.
@@ -142,14 +142,17 @@ class MailboxedList(wiring.Component):
         layout = with_token(self._token, item=self._entry, following=self._index_width)
         entries = [Signal(layout, name=f"entry{stage}", reset_less=stage > 0) for stage in range(5)]
         looking, clearing = Signal(5), Signal(4)
+        # Who begins has come a long way.
+        begin = Signal.like(self.begin)
+        m.d.sync += begin.eq(self.begin)
         first, token = entries[0], self.entry.payload.payload.token
         # An instance's triangles are forgotten in the cycle after its entry, in which no other is looked at.
         pending, pending_thread = Signal(), Signal.like(token.thread, reset_less=True)
         m.d.comb += [
-            self.entry.ready.eq(~self.begin.valid & ~pending),
+            self.entry.ready.eq(~begin.valid & ~pending),
             looking[0].eq(self.entry.valid & self.entry.ready),
             self.busy.eq(looking[0]),
-            clearing[0].eq(self.begin.valid | pending),
+            clearing[0].eq(begin.valid | pending),
             first.item.eq(self.entry.payload.item),
             first.following.eq(self.entry.payload.payload.list + 1),
             first.token.eq(token),
@@ -160,9 +163,9 @@ class MailboxedList(wiring.Component):
             contexts.write.data.last.eq(first.item.last),
         ]
         with m.If(clearing[0]):
-            m.d.comb += [first.token.level.eq(~self.begin.valid),
-                         first.token.thread.eq(Mux(self.begin.valid, self.begin.thread, pending_thread))]
-        with m.If(~self.begin.valid):
+            m.d.comb += [first.token.level.eq(~begin.valid),
+                         first.token.thread.eq(Mux(begin.valid, begin.thread, pending_thread))]
+        with m.If(~begin.valid):
             m.d.sync += pending.eq(looking[0] & first.item.instance)
         with m.If(looking[0]):
             m.d.sync += pending_thread.eq(token.thread)

@@ -53,6 +53,9 @@ class Threads(wiring.Component):
         m = Module()
         threads = self._num_threads
         m.submodules.free = free = Queue(thread_width(threads), depth=threads, always_ready=True)
+        # So that who makes packets does not wait within a cycle for who draws them.
+        m.submodules.packets = packets = Queue(self.packet.payload.shape(), depth=2)
+        wiring.connect(m, wiring.flipped(self.packet), packets.i)
         m.submodules.positions = positions = memory.Memory(
             shape=self._position, depth=1 << thread_width(threads), init=[])
         write = positions.write_port()
@@ -62,14 +65,14 @@ class Threads(wiring.Component):
         at_work = Signal(range(threads + 1))
         thread = Signal(thread_width(threads))
         available, issued = Signal(), Signal()
-        packet = self.packet.payload
+        packet = packets.o.payload
         m.d.comb += [
             free.i.payload.eq(self.finished.payload.thread),
             free.i.valid.eq(self.finished.valid),
             thread.eq(Mux(unused.any(), unused - 1, free.o.payload)),
             available.eq(unused.any() | free.o.valid),
-            self.primary.valid.eq(self.packet.valid & available),
-            self.packet.ready.eq(self.primary.ready & available),
+            self.primary.valid.eq(packets.o.valid & available),
+            packets.o.ready.eq(self.primary.ready & available),
             issued.eq(self.primary.valid & self.primary.ready),
             free.o.ready.eq(issued & ~unused.any()),
             self.primary.payload.token.thread.eq(thread),
@@ -82,7 +85,7 @@ class Threads(wiring.Component):
             write.data.x.eq(packet.x),
             write.data.y.eq(packet.y),
             write.en.eq(issued),
-            self.ready.eq(~at_work.any()),
+            self.ready.eq(~at_work.any() & ~packets.o.valid),
         ]
         for address, position in zip(self.position_address, self.position, strict=True):
             read = positions.read_port(domain="comb")

@@ -77,6 +77,13 @@ def stack_proof(*, stack_depth, patience):
     free(dut.push, dut.pop.payload, dut.pop.valid, dut.hit_distances)
     m.d.comb += Assume(~dut.push.valid | (dut.push.token.sp < stack_depth))
     m.d.comb += Assume(~dut.pop.valid | (dut.pop.payload.sp <= stack_depth))
+    # Who pushes holds the thread's token.
+    inside = Signal(NUM_THREADS)
+    m.d.comb += Assume(~(dut.push.valid & inside.bit_select(dut.push.token.thread, 1)))
+    for port, token, is_inside in ((dut.resume, dut.resume.payload.token, 0), (dut.exhausted, dut.exhausted.payload, 0),
+                                   (dut.pop, dut.pop.payload, 1)):
+        with m.If(port.valid & port.ready):
+            m.d.sync += inside.bit_select(token.thread, 1).eq(is_inside)
     account = Account()
     account.takes(dut.pop.valid & dut.pop.ready, dut.pop.payload, holder=1)
     account.gives(dut.resume.valid, dut.resume.payload.token, holder=1)
@@ -99,11 +106,11 @@ def list_proof(*, patience):
     m.d.sync += began.eq(begin.valid)
     m.d.comb += Assume(~(begin.valid & began))
     for thread in range(NUM_THREADS):
-        young = Signal(range(5), name=f"young{thread}")
+        young = Signal(range(6), name=f"young{thread}")
         begins = Signal(name=f"begins{thread}")
         m.d.comb += [begins.eq(begin.valid & (begin.thread == thread)),
                      Assume(~((begins | young.any()) & dut.entry.valid & (entry.thread == thread)))]
-        m.d.sync += young.eq(Mux(begins, 4, young - young.any()))
+        m.d.sync += young.eq(Mux(begins, 5, young - young.any()))
 
     # Who comes back to a list has been sent from one.
     sent = Signal(2 * NUM_THREADS)
@@ -127,8 +134,8 @@ def list_proof(*, patience):
 
 # The longest that a token stays: a cycle less is refuted.
 @pytest.mark.parametrize(("proof", "parameters", "patience", "cycles"), [
-    (stack_proof, dict(stack_depth=1), 4, 11),
-    (stack_proof, dict(stack_depth=2), 9, 14),
+    (stack_proof, dict(stack_depth=1), 7, 13),
+    (stack_proof, dict(stack_depth=2), 14, 18),
     (list_proof, dict(), 6, 15),
 ])
 def test_no_token_is_lost_or_doubled(tmp_path, proof, parameters, patience, cycles):

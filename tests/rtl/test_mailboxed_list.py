@@ -163,7 +163,7 @@ def run(world, *, num_threads):
                 world.num_packets -= 1
                 packet = world.packets[thread] = Packet(world, thread)
                 ctx.set(dut.begin, {"valid": 1, "thread": thread})
-                begun.append((4, packet))
+                begun.append((5, packet))
             if world.waiting and rng.random() < 0.5:
                 port, packet, level = world.waiting.pop(rng.randrange(len(world.waiting)))
                 port.append(random_token(rng, thread=packet.thread, stack_depth=STACK_DEPTH, level=level,
