@@ -1,7 +1,6 @@
 """Several frames on one chip, whose memories are written while it draws."""
 
 import re
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,9 +16,10 @@ from sim.scene import load_scene
 from sim.scene.compile import CompiledScene
 
 from .scenes import instances_scene
+from .test_shading import CHIPS
 
 # Compiled chips are kept; one worker for all of these compiles each only once.
-pytestmark = pytest.mark.xdist_group("chip")
+of_the_chip = pytest.mark.xdist_group("chip")
 
 
 def walk_poses(*times):
@@ -28,6 +28,7 @@ def walk_poses(*times):
     return scene, [(pose, pose.default_camera()) for pose in poses]
 
 
+@of_the_chip
 def test_frames_of_key_frames():
     scene, poses = walk_poses(0.0, 1.0, 2.6, 5.5)
     config, size = ChipConfig(), (48, 36)
@@ -54,6 +55,7 @@ def test_frames_of_key_frames():
                for (_, before), (_, after) in pairwise(frames))
 
 
+@of_the_chip
 def test_frames_of_a_function():
     scene = instances_scene(2)
     config, size = ChipConfig(), (32, 24)
@@ -71,12 +73,13 @@ def test_frames_of_a_function():
     assert frames[0].differs(frames[2]).mean() > 0.05
 
 
+@pytest.mark.xdist_group("shading_chip")
 def test_frames_of_full_shading(monkeypatch):
-    # Compiling the chip takes longer than three small pictures.
+    # Compiling a chip takes longer than three small pictures; this one is compiled already.
     monkeypatch.setenv("DYNRT_OPTIMISE", "-O0")
     scene, poses = walk_poses(0.0, 3.0, 6.0)
     compiled = CompiledScene(scene, fmt=ChipConfig().fmt)
-    config, size = replace(ChipConfig(), shader=replace(compiled.needs, depth=1)), (24, 18)
+    config, size = CHIPS["two shaders"], (8, 6)
     frames = [frame for _, frame in render_frames(compiled, poses, *size, config=config, background=(9, 8, 7))]
     for number, (frame, (pose, camera)) in enumerate(zip(frames, poses, strict=True)):
         image = compiled.image(pose, eye=camera.eye, is_full=True, background=(9, 8, 7))
@@ -88,6 +91,7 @@ def test_frames_of_full_shading(monkeypatch):
     assert (frames[0].color != frames[1].color).mean() > 0.5
 
 
+@of_the_chip
 def test_the_example_of_the_documentation(tmp_path, monkeypatch):
     page = Path(__file__).parents[3] / "docs" / "moving.md"
     monkeypatch.chdir(tmp_path)
@@ -98,12 +102,14 @@ def test_the_example_of_the_documentation(tmp_path, monkeypatch):
     assert 0 < differ[0] < differ[2]
 
 
+@of_the_chip
 def test_no_frames():
     scene = instances_scene(0)
     compiled = CompiledScene(scene, fmt=ChipConfig().fmt, flatten=False)
     assert list(render_frames(compiled, [], 4, 4, config=ChipConfig())) == []
 
 
+@of_the_chip
 def test_writing_beyond_a_memory():
     with Bench(ChipConfig()) as bench:
         bench.load("lists", np.zeros(8, np.uint32))

@@ -21,7 +21,7 @@ SWITCHES = ("reflection", "refraction", "transparency", "textures", "highlights"
             "point_lights", "spot_lights", "directional_lights", "fading_lights", "shadows", "sky", "instances",
             "smooth")
 EVERYTHING = ShaderFeatures(**dict.fromkeys(SWITCHES, True), depth=4)
-MIRRORS = ShaderFeatures(**{name: name in ("reflection", "point_lights", "shadows") for name in SWITCHES}, depth=2)
+MIRRORS = ShaderFeatures(**{name: name in ("reflection", "point_lights", "shadows") for name in SWITCHES}, depth=16)
 
 #: Everything is short, caches, queues and threads, so that all of it fills up.
 SMALL = replace(ChipConfig(), num_threads=1, node_lines=32, list_lines=16, matrix_lines=8, num_fetches=2,
@@ -81,7 +81,7 @@ def assert_equal(scene, *, config, size, flatten=None, camera=None, **memory):
     return frame, model.report["ray_kinds"]
 
 
-@pytest.mark.parametrize(("chip", "size", "seed"), [("two shaders", (32, 23), 2), ("two shaders", (12, 9), 6)])
+@pytest.mark.parametrize(("chip", "size", "seed"), [("two shaders", (20, 15), 2), ("two shaders", (12, 9), 6)])
 def test_a_mirror_room(chip, size, seed):
     frame, kinds = assert_equal(load_scene("mirror-room"), config=CHIPS[chip], size=size, jitter=20, seed=seed)
     assert len(np.unique(frame.color.reshape(-1, 3), axis=0)) > size[0] * size[1] / 3
@@ -101,7 +101,7 @@ def test_glass_and_veils(chip, size, seed, flatten):
 def test_mirrors_and_shadows_alone(jitter):
     scene = scene_of(floor(reflection=0.5), ball((0, 0, 1.2), 1.0, Material("brass", (0.7, 0.5, 0.2), reflection=0.3)),
                      lights=[Light("point", position=(1.0, -2.0, 3.0), intensity=6.0, radius=0.2)])
-    frame, kinds = assert_equal(scene, config=CHIPS["mirrors and shadows, two pipelines"], size=(32, 24), camera=EYE,
+    frame, kinds = assert_equal(scene, config=CHIPS["mirrors and shadows, two pipelines"], size=(24, 16), camera=EYE,
                                 flatten=True, jitter=jitter)
     assert frame.color.std() > 5
     assert min(kinds["reflection"], kinds["shadow"]) > 100

@@ -1,19 +1,16 @@
 """The chip at the limits of what it can draw: as many lights as there may be, mirrors that see each other."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from sim.scene import Camera, Light, Material
 
 from ..golden.rooms import quad, scene_of
-from .test_shading import MIRRORS, SMALL, assert_equal, floor
+from .test_shading import CHIPS, assert_equal, floor
 
 pytestmark = pytest.mark.xdist_group("shading_chip")
 
-DEPTH = 16
-CHIP = replace(SMALL, num_threads=4, shader=replace(MIRRORS, depth=DEPTH))
+CHIP = CHIPS["mirrors and shadows, two pipelines"]
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +29,7 @@ def test_a_hall_of_mirrors():
     frame, kinds = assert_equal(scene, config=CHIP, size=size, jitter=10, flatten=True,
                                 camera=Camera((0, 0, 0), (0.02, 1, 0.01), (0, 0, 1), 20.0))
     assert kinds["primary"] == size[0] * size[1]
-    assert kinds["reflection"] == DEPTH * size[0] * size[1]
+    assert kinds["reflection"] == CHIP.shader.depth * size[0] * size[1]
     assert not kinds["shadow"]
     # What is not started adds nothing.
     assert not frame.color.any()
