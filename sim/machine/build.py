@@ -125,13 +125,12 @@ def _build(config, trace, work, progress):
     elif trace == "fst":
         runtime.append("verilated_fst_c.cpp")
         libraries = ["-lz"]
-    sources = [*sorted((work / "cpp").glob("*.cpp")), *(root / "include" / name for name in runtime),
-               _HERE / "bench.cpp"]
-    flags = ["-std=c++17", "-fPIC", "-w", f"-I{work / 'cpp'}", f"-I{root / 'include'}",
-             f"-I{root / 'include' / 'vltstd'}", f"-DBENCH_TRACE={_TRACES[trace]}", f"-DBENCH_UNITS={len(UNITS)}",
-             f"-DBENCH_PIPELINES={config.num_pipelines}", f"-DBENCH_TEXTURES={int('textures' in memory_ports(config))}",
-             f"-DVM_TRACE={int(bool(trace))}", f"-DVM_TRACE_VCD={int(trace == 'vcd')}",
-             f"-DVM_TRACE_FST={int(trace == 'fst')}", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVL_USER_STOP"]
+    sources = [*sorted((work / "cpp").glob("*.cpp")), _HERE / "bench.cpp"]
+    common = ["-std=c++17", "-fPIC", "-w", f"-I{root / 'include'}", f"-I{root / 'include' / 'vltstd'}",
+              f"-DVM_TRACE={int(bool(trace))}", f"-DVM_TRACE_VCD={int(trace == 'vcd')}",
+              f"-DVM_TRACE_FST={int(trace == 'fst')}", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVL_USER_STOP"]
+    flags = [*common, f"-I{work / 'cpp'}", f"-DBENCH_TRACE={_TRACES[trace]}", f"-DBENCH_UNITS={len(UNITS)}",
+             f"-DBENCH_PIPELINES={config.num_pipelines}", f"-DBENCH_TEXTURES={int('textures' in memory_ports(config))}"]
     compiler = _compiler()
 
     def compile_source(source):
@@ -141,11 +140,25 @@ def _build(config, trace, work, progress):
         _run([*compiler, *flags, optimise, "-c", str(source), "-o", str(target)], cwd=work, log=log)
         return str(target)
 
+    def compile_runtime(name):
+        """Verilator's own part is the same for all chips, and kept."""
+        command = [*compiler, *common, _optimisation(trace), "-c", str(root / "include" / name)]
+        key = hashlib.sha256(repr((command, importlib.metadata.version("verilator"))).encode()).hexdigest()[:20]
+        kept = work.parent / f"{Path(name).stem}-{key}.o"
+        if not kept.exists():
+            target = work / kept.name
+            _run([*command, "-o", str(target)], cwd=work, log=log)
+            target.replace(kept)
+        return str(kept)
+
     progress(f"compiling {len(sources)} C++ files")
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         # Largest first, so that no core ends up alone with the longest.
+        kept = pool.map(compile_runtime, runtime)
         objects = list(pool.map(compile_source, sorted(sources, key=lambda path: -path.stat().st_size)))
-    _run([*compiler, "-shared", "-o", str(work / "chip.so"), *objects, "-lpthread", *libraries], cwd=work, log=log)
+        kept = list(kept)
+    _run([*compiler, "-shared", "-o", str(work / "chip.so"), *objects, *kept, "-lpthread", *libraries], cwd=work,
+         log=log)
     for target in objects:
         os.unlink(target)
     shutil.rmtree(work / "cpp")
