@@ -189,8 +189,9 @@ _BY_FILE = {
         ("limit=Mux(s.sign, lowest, highest)", "limit=Mux(s.sign, highest, lowest)", "saturation at the wrong end"),
     ],
     "fpu/delay.py": [
-        ("Mux(position == self.cycles - 1, 0, position + 1)", "Mux(position == self.cycles - 2, 0, position + 1)",
+        ("Mux(position == depth - 1, 0, position + 1)", "Mux(position == depth - 2, 0, position + 1)",
          "a delay in memory is a cycle short"),
+        ("depth = self.cycles - self._registered", "depth = self.cycles", "a register behind a memory is one too many"),
         ("read.addr.eq(following)", "read.addr.eq(position)", "a delay in memory is read where it is written"),
         ("            for _ in range(self.cycles):\n", "            for _ in range(self.cycles - 1):\n",
          "a delay in flip-flops is a cycle short"),
