@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from fpu import Rounding, TableDivider
 
-__all__ = ["ARITHMETICS", "Arithmetic"]
+__all__ = ["ARITHMETICS", "NUMBERS", "Arithmetic"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,3 +50,5 @@ ARITHMETICS = (
     Arithmetic(name="reciprocal", by_reciprocal=True),
     Arithmetic(name="table", by_table=True),
 )
+#: Their numbers, by name.
+NUMBERS = {arithmetic.name: number for number, arithmetic in enumerate(ARITHMETICS)}

@@ -115,7 +115,8 @@ class Cache(wiring.Component):
         m.d.comb += answered.eq(self.response.valid & self.response.ready)
         m.d.sync += promised.eq(promised + (starts + claims) - (answered + vain))
 
-        # Lookup: whoever has fetched goes first, then one that waits, then a new one; nobody while a line is written.
+        # Lookup: whoever has fetched goes first, and so finds the line, then one that waits, then a new one; nobody
+        # while a line is written.
         owner, owner_looks = Signal(request_layout, reset_less=True), Signal()
         head, again = Signal(request_layout, reset_less=True), Signal()
         comes, allowed = Signal(), Signal()
@@ -127,13 +128,12 @@ class Cache(wiring.Component):
             requests.o.ready.eq(allowed & ~again),
             first.eq(Mux(owner_looks, owner, Mux(again, head, requests.o.payload))),
         ]
-        about_layout = data.StructLayout({"valid": 1, "repeated": 1, "owns": 1})
+        about_layout = data.StructLayout({"valid": 1, "repeated": 1})
         about = [Signal(about_layout, name=f"about{stage}") for stage in range(4)]
         looking = [Signal(request_layout, name=f"looking{stage}", reset_less=True) for stage in range(4)]
         m.d.comb += [
             about[0].valid.eq(starts | owner_looks),
             about[0].repeated.eq(again | owner_looks),
-            about[0].owns.eq(owner_looks),
             looking[0].eq(first),
         ]
         for stage in range(3):
@@ -142,7 +142,7 @@ class Cache(wiring.Component):
             m.d.comb += [rows.reading.eq(about[0].valid), rows.address.eq(self._line(first)[:self._slot_bits])]
         compared, found, item = looking[2], Signal(), Signal(self._item_width, reset_less=True)
         m.d.sync += [
-            found.eq(about[2].owns | tags.data.valid & (tags.data.tag == self._line(compared)[self._slot_bits:])),
+            found.eq(tags.data.valid & (tags.data.tag == self._line(compared)[self._slot_bits:])),
             item.eq(self._select_item(lines.data, compared.index)),
         ]
 
@@ -165,6 +165,7 @@ class Cache(wiring.Component):
         issue = self._decide(m, waiting.o, head=head, again=again, again_starts=again & allowed, claims=claims,
                              may_claim=promised < max_promised, comes=comes)
         self._fill(m, tags, lines, head=head, issue=issue, owner=owner, owner_looks=owner_looks, comes=comes)
+        self._forget(m, tags)
         return m
 
     def _decide(self, m, waiting, *, head, again, again_starts, claims, may_claim, comes):
@@ -242,6 +243,8 @@ class Cache(wiring.Component):
             m.d.sync += [gathered.eq(Cat(gathered, self.line_data.payload)[WORD_WIDTH:]),
                          count.eq(Mux(last, 0, count + 1))]
 
+    def _forget(self, m, tags):
+        """Clears one tag after the other."""
         flush_slot = Signal(range(self._num_lines + 1))
         cleared, clears = Signal(range(self._num_lines)), Signal()
         at_end = Signal()

@@ -6,6 +6,8 @@ from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from fpu import Delay
+
 from .block_memory import BlockMemory
 from .layout import PACKET_RAYS, job_layout, list_entry_layout, thread_width, token_layout, with_token
 from .queue import Merge, Queue
@@ -120,21 +122,19 @@ class MailboxedList(wiring.Component):
         wiring.connect(m, wiring.flipped(self.tested), back.i[0])
         wiring.connect(m, wiring.flipped(self.left), back.i[1])
         token = back.o.payload
-        hits = [Signal(PACKET_RAYS, name=f"hit{stage}", reset_less=True) for stage in range(contexts.latency + 1)]
+        m.submodules.hits = hits = Delay(PACKET_RAYS, cycles=contexts.latency)
         comes = Signal(contexts.latency + 1)
         m.d.comb += [
             back.o.ready.eq(1),
-            hits[0].eq(token.hit),
+            hits.i.eq(token.hit),
             comes[0].eq(back.o.valid),
             contexts.reading.eq(back.o.valid),
             contexts.address.eq(Cat(token.level, token.thread)),
             returned.valid.eq(comes[-1]),
             returned.payload.eq(contexts.data),
-            returned.payload.token.hit.eq(hits[-1]),
+            returned.payload.token.hit.eq(hits.o),
         ]
         m.d.sync += comes[1:].eq(comes[:-1])
-        for earlier, later in pairwise(hits):
-            m.d.sync += later.eq(earlier)
         return contexts
 
     def _look(self, m, contexts):

@@ -7,17 +7,17 @@ from boards.ecp5 import place
 from boards.packing import is_packed, pack
 from rtl.affine_map import affine_map
 from rtl.arithmetic import ARITHMETICS
-from rtl.config import ChipConfig
 from rtl.dynrtc import DynRTC
 from rtl.intersection import unit_triangle
 from rtl.layout import PACKET_RAYS
-from rtl.program.features import ShaderFeatures
 from rtl.traversal import kd_step
+
+from .pipeline_chips import CHIPS
 
 __all__ = ["FULL", "GRADE", "area_of", "blocks_of", "datapath_tables", "smallest_device", "speed_of"]
 
 #: The full chip, which a fitted one is set beside.
-FULL = ChipConfig(shader=ShaderFeatures(depth=4))
+FULL = CHIPS["everything"].config
 #: Of the device, and of its placer.
 GRADE, _SEED = 6, 1
 # A block RAM has 512 words of 36 bits, of which memory's words use 32.

@@ -6,22 +6,22 @@ from amaranth.utils import exact_log2
 
 from fpu import FloatFormat
 from fpu.reciprocal import MAX_FRAC_WIDTH
-from rtl.arithmetic import ARITHMETICS
+from rtl.arithmetic import ARITHMETICS, NUMBERS
 from rtl.config import ChipConfig
+from rtl.program.features import SWITCHES
 from sim.scene.shading_image import needed_features
 
 from .errors import BadInput
 from .fit_area import FULL, area_of, blocks_of, datapath_tables, smallest_device, speed_of
 from .fit_format import VARIANTS, FormatSearch
 from .fit_pictures import Pictures
-from .fit_reasons import CACHES, SWITCHES, Reason, reasons_of
+from .fit_reasons import CACHES, Reason, reasons_of
 from .fit_speed import Clockwork, SpeedSearch
 
 __all__ = ["Fitting", "is_plain"]
 
 #: The picture by which threads and more are fitted.
 _SMALL = 96, 72
-_NUMBERS = {arithmetic.name: number for number, arithmetic in enumerate(ARITHMETICS)}
 #: What is there in full shading of any scene.
 _ALWAYS = {"point_lights", "shadows"}
 
@@ -162,9 +162,9 @@ class Fitting:
     def _divisions(self, candidate):
         """The candidate's chip, by the ways to divide that draw as well."""
         way = self._chip(candidate.fmt, **VARIANTS[candidate.variant])
-        if way.arithmetic != _NUMBERS["separate"]:
+        if way.arithmetic != NUMBERS["separate"]:
             return [way]
-        by_table, by_reciprocal = (replace(way, arithmetic=_NUMBERS[name]) for name in ("table", "reciprocal"))
+        by_table, by_reciprocal = (replace(way, arithmetic=NUMBERS[name]) for name in ("table", "reciprocal"))
         # There are no tables for wider fractions.
         if candidate.fmt.frac_width > MAX_FRAC_WIDTH:
             return [way]

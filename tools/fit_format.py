@@ -3,14 +3,13 @@
 from dataclasses import dataclass, field
 
 from fpu import FloatFormat
-from rtl.arithmetic import ARITHMETICS
+from rtl.arithmetic import NUMBERS
 
 __all__ = ["VARIANTS", "Candidate", "FormatSearch"]
 
-_NUMBERS = {arithmetic.name: number for number, arithmetic in enumerate(ARITHMETICS)}
 #: Ways to compute that draw different pictures: parameters of a chip by name.
 VARIANTS = {"separate": {}, **{f"tolerant {ulp}": {"edge_tolerance": ulp} for ulp in (1, 2, 4, 8)},
-            **{name: {"arithmetic": _NUMBERS[name]} for name in ("fused-narrow", "truncated")}}
+            **{name: {"arithmetic": NUMBERS[name]} for name in ("fused-narrow", "truncated")}}
 _EXPONENTS, _FRACTIONS = range(5, 9), range(10, 24)
 #: Fraction bits in which exponents are compared: enough for all scenes of the chart.
 _AMPLE = 20

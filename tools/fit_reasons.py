@@ -1,17 +1,15 @@
 """Why a fitted chip is what it is."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from rtl.arithmetic import ARITHMETICS
-from rtl.program.features import ShaderFeatures
+from rtl.program.features import SWITCHES
 
 from .fit_area import blocks_of
 from .fit_format import VARIANTS
 
-__all__ = ["CACHES", "SWITCHES", "Reason", "reasons_of"]
+__all__ = ["CACHES", "Reason", "reasons_of"]
 
-#: What a shader may have or not.
-SWITCHES = tuple(field.name for field in fields(ShaderFeatures) if field.type is bool)
 #: Lines of caches, and items of a line.
 CACHES = {"node_lines": "node_line_items", "list_lines": "list_line_items", "matrix_lines": None,
           "shading_lines": None, "texture_lines": "texture_line_items"}

@@ -1,13 +1,12 @@
 """The chips whose area is compared, each with the one it is set beside."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 from rtl.config import ChipConfig
-from rtl.program.features import ShaderFeatures
+from rtl.program.features import SWITCHES, ShaderFeatures
 
 __all__ = ["CHIPS", "CLOCKED", "DETAILED", "SMALL", "Chip"]
 
-SWITCHES = tuple(field.name for field in fields(ShaderFeatures) if field.type is bool)
 #: Generations of secondary rays where there are any.
 DEPTH = 4
 #: What a feature does nothing, or cannot be had, without.

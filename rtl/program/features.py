@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields
 
-__all__ = ["ShaderFeatures"]
+__all__ = ["SWITCHES", "ShaderFeatures"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +65,7 @@ class ShaderFeatures:
 
     def missing(self, needed):
         """Names of what ``needed`` (ShaderFeatures) has and this has not; a depth is no need."""
-        return [field.name for field in fields(self)
-                if field.type is bool and getattr(needed, field.name) and not getattr(self, field.name)]
+        return [name for name in SWITCHES if getattr(needed, name) and not getattr(self, name)]
 
     @property
     def shares(self):
@@ -92,3 +91,7 @@ class ShaderFeatures:
     def near_lights(self):
         """Whether there are lights at a place."""
         return self.point_lights or self.spot_lights
+
+
+#: Names of what a shader may be able to do or not.
+SWITCHES = tuple(field.name for field in fields(ShaderFeatures) if field.type is bool)

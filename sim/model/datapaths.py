@@ -2,7 +2,7 @@
 
 from fpu import FloatFormat
 from rtl import intersection, transformation, traversal
-from rtl.arithmetic import ARITHMETICS
+from rtl.arithmetic import ARITHMETICS, NUMBERS
 
 from .compiled import compiled
 
@@ -10,9 +10,8 @@ __all__ = ["affine_map", "kd_step", "scaled_map", "tolerant_triangle", "unit_tri
 
 # The kernels are the same for every format, which they take as an argument.
 _ANY = FloatFormat(7, 16)
-_NUMBERS = {arithmetic.name: number for number, arithmetic in enumerate(ARITHMETICS)}
 _FUSED, _NARROW, _TRUNCATED, _RECIPROCAL = (
-    _NUMBERS[name] for name in ("fused", "fused-narrow", "truncated", "reciprocal"))
+    NUMBERS[name] for name in ("fused", "fused-narrow", "truncated", "reciprocal"))
 
 
 def _kernel(datapath, number=0, **options):

@@ -8,6 +8,7 @@ wind clockwise; here they are turned, so that the front is where the stored norm
 import numpy as np
 
 from .patches import grid_triangles, tessellate
+from .pk3 import MAX_TEXT
 from .records import Records, text
 from .scene import Mesh
 
@@ -27,7 +28,6 @@ _SKY, _NOT_DRAWN = 0x4, 0x380
 _MAX_SIDE = 129
 # Faces may share vertices: a small file must not claim the machine's memory. The largest maps have a tenth of this.
 _MAX_TRIANGLES = 1 << 20
-_MAX_TEXT = 1 << 20
 
 
 class Bsp:
@@ -61,8 +61,8 @@ class Bsp:
             raise self._file.error("not a map of Quake III (IBSP, version 46)")
         self._lumps = self._file.table("directory", ("<i4", 2), 8, 17)
         entities = self._lump("entities", "u1")
-        if len(entities) > _MAX_TEXT:
-            raise self._file.error(f"entities: {len(entities):,} bytes; at most {_MAX_TEXT:,} are read")
+        if len(entities) > MAX_TEXT:
+            raise self._file.error(f"entities: {len(entities):,} bytes; at most {MAX_TEXT:,} are read")
         self.entities = text(entities)
         textures = self._lump("textures", _TEXTURE)
         self.textures = [text(raw).lower() for raw in textures["name"]]

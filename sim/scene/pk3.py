@@ -6,12 +6,13 @@ from pathlib import PurePosixPath
 from .error import SceneError
 from .files import inside
 
-__all__ = ["Archive", "Folder", "read_text"]
+__all__ = ["MAX_TEXT", "Archive", "Folder", "read_text"]
 
 # The largest of the game's own files is a tenth of this; a few bytes must not take the machine's memory.
 _MAX_FILE = 1 << 26
 _MAX_TOTAL = 1 << 29
-_MAX_TEXT = 1 << 20
+#: Bytes of a text, such as a script.
+MAX_TEXT = 1 << 20
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _ENCRYPTED = 1
 
@@ -142,6 +143,6 @@ def read_text(archive, name):
         As of :meth:`Archive.read`, or if it is not small.
     """
     data = archive.read(name)
-    if len(data) > _MAX_TEXT:
-        raise SceneError(f"{archive.path}: {name}: has {len(data):,} bytes; of texts at most {_MAX_TEXT:,} are read")
+    if len(data) > MAX_TEXT:
+        raise SceneError(f"{archive.path}: {name}: has {len(data):,} bytes; of texts at most {MAX_TEXT:,} are read")
     return data.decode("latin-1")

@@ -11,9 +11,10 @@ from click.testing import CliRunner
 from boards.ecp5 import design_of
 from fpu import Adder, Comparator, FloatFormat
 from rtl.config import ChipConfig
+from rtl.program.features import SWITCHES
 from tools import pipeline_area
 from tools.cli import main
-from tools.pipeline_chips import CHIPS, CLOCKED, DETAILED, SWITCHES, Chip
+from tools.pipeline_chips import CHIPS, CLOCKED, DETAILED, Chip
 from tools.pipeline_page import filled
 
 # Operators are asked for their latency without being built.

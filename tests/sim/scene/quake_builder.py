@@ -7,9 +7,14 @@ import zipfile
 import numpy as np
 from PIL import Image
 
-__all__ = ["bsp", "face", "md3", "picture", "pk3", "small_map", "small_player", "surface"]
+__all__ = ["bsp", "corners", "face", "md3", "picture", "pk3", "small_map", "small_player", "surface"]
 
 _ENTITIES, _TEXTURES, _MODELS, _VERTICES, _MESHVERTS, _FACES = 0, 1, 7, 10, 11, 13
+
+
+def corners(mesh):
+    """The corners of a mesh's triangles."""
+    return mesh.vertices[mesh.triangles]
 
 
 def face(kind, *, texture=0, vertices=(0, 0), meshverts=(0, 0), size=(0, 0)):

@@ -10,7 +10,7 @@ from sim.scene import SceneError, load_scene
 from sim.scene.normals import flat_normals
 from sim.scene.patches import tessellate
 
-from .quake_builder import ENTITIES, PATCH, SQUARE, UP, bsp, face, picture, pk3, small_map
+from .quake_builder import ENTITIES, PATCH, SQUARE, UP, bsp, corners, face, picture, pk3, small_map
 
 PICTURES = {"textures/a/floor.jpg": picture((10, 20, 30), "JPEG"), "textures/a/veil.tga": picture((1, 2, 3, 128))}
 
@@ -24,10 +24,6 @@ def load(tmp_path):
         return load_scene(tmp_path / "a.pk3")
 
     return write_and_load
-
-
-def corners(mesh):
-    return mesh.vertices[mesh.triangles]
 
 
 def test_the_world(load):

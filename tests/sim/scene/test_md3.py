@@ -11,7 +11,7 @@ from sim.scene.pk3 import Archive
 from sim.scene.quake_player import Wardrobe, load_md3, player_mesh
 from sim.scene.quake_players import floors, quake_players_scene
 
-from .quake_builder import CORNERS, UPRIGHT, md3, picture, pk3, small_player, surface
+from .quake_builder import CORNERS, UPRIGHT, corners, md3, picture, pk3, small_player, surface
 
 FRAMES = [CORNERS, [(x, y, z - 1.5) for x, y, z in CORNERS]]
 
@@ -56,10 +56,6 @@ def archive(tmp_path):
         return Archive(tmp_path / "a.pk3")
 
     return write
-
-
-def corners(mesh):
-    return mesh.vertices[mesh.triangles]
 
 
 def test_a_player(archive):
