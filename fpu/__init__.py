@@ -13,11 +13,12 @@ from .graph import Vector
 from .multiplier import Multiplier
 from .reciprocal import Reciprocal, TableDivider
 from .reciprocal_square_root import ReciprocalSquareRoot
+from .root_recurrence import DigitReciprocalSquareRoot, reciprocal_square_root_for
 from .rounding import Rounding
 from .square_root import SquareRoot
 
 __all__ = [
-    "Adder", "Comparator", "Datapath", "Delay", "Divider", "DotProduct", "FloatFormat", "FloatToInt", "IntToFloat",
-    "Maximum", "Minimum", "Multiplier", "Reciprocal", "ReciprocalSquareRoot", "Rounding", "SquareRoot",
-    "Subtractor", "TableDivider", "Vector",
+    "Adder", "Comparator", "Datapath", "Delay", "DigitReciprocalSquareRoot", "Divider", "DotProduct", "FloatFormat",
+    "FloatToInt", "IntToFloat", "Maximum", "Minimum", "Multiplier", "Reciprocal", "ReciprocalSquareRoot", "Rounding",
+    "SquareRoot", "Subtractor", "TableDivider", "Vector", "reciprocal_square_root_for",
 ]

@@ -32,7 +32,7 @@ def check_fits_table(fmt):
     """Raises ValueError if a significand is too wide for operators by table."""
     if fmt.frac_width > MAX_FRAC_WIDTH:
         raise ValueError(f"By table goes a fraction of up to {MAX_FRAC_WIDTH} bits, not {fmt.frac_width}; take a digit "
-                         "recurrence: Divider, SquareRoot")
+                         "recurrence: Divider, SquareRoot, DigitReciprocalSquareRoot")
 
 
 @lru_cache

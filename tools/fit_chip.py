@@ -4,7 +4,6 @@ from dataclasses import asdict, replace
 
 from amaranth.utils import exact_log2
 
-from fpu import FloatFormat
 from fpu.reciprocal import MAX_FRAC_WIDTH
 from rtl.arithmetic import ARITHMETICS, NUMBERS
 from rtl.config import ChipConfig
@@ -70,8 +69,6 @@ class Fitting:
         shading, asked = shading or ("simple" if plain else "full"), shading is not None
         self._pictures = Pictures(scene, poses, size, shading=shading, depth=depth, flatten=flatten, progress=progress)
         self._clock = Clockwork(pictures=self._pictures, latency=latency, progress=progress)
-        # Roots, which lights and mirrors need, go by table.
-        self._most_bits = MAX_FRAC_WIDTH if shading == "full" else FloatFormat(8, 23).frac_width
         if shading == "simple":
             self._because("shader", "none", "asked for" if asked else "the scene has neither lights nor ambient light, "
                           "and its materials are colours alone")
@@ -127,11 +124,11 @@ class Fitting:
             self._progress(f"drawing by the model at {fmt}, {variant}")
             return self._pictures.faults(self._chip(fmt, **VARIANTS[variant]))
 
-        search = FormatSearch(faults_of, self._quality, most_bits=self._most_bits, tell=self._tell)
+        search = FormatSearch(faults_of, self._quality, tell=self._tell)
         candidates = search.run()
         if not candidates:
             near = search.best()
-            raise BadInput(f"no format of up to {self._most_bits} fraction bits draws this well enough "
+            raise BadInput(f"no format of up to {search.most_bits} fraction bits draws this well enough "
                            f"({self._quality}); " + (
                 f"what comes nearest is {near[0]}, {near[1]}: {near[2]}; ask for less with --quality" if near else
                 "the scene fits none: " + next(iter(search.tried.values()))))

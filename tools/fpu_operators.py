@@ -91,6 +91,7 @@ OPERATORS = {entry.name: entry for entry in (
     Entry(operator=fpu.Reciprocal, exact=lambda a: 1 / a),
     Entry(operator=fpu.SquareRoot, exact=lambda a: math.sqrt(a)),
     Entry(operator=fpu.ReciprocalSquareRoot, exact=lambda a: 1 / math.sqrt(a)),
+    Entry(operator=fpu.DigitReciprocalSquareRoot, exact=lambda a: 1 / math.sqrt(a)),
     Entry(operator=fpu.DotProduct, exact=_dot, constants=lambda fmt: (-1,)),
     Entry(operator=fpu.Minimum, exact=lambda a, b: min(a, b)),
     Entry(operator=fpu.IntToFloat, exact=lambda i: i, parameters=_INT, **_INT),

@@ -19,6 +19,10 @@ def _demos(results):
     by_format = markdown_table(
         ["demo: PSNR in dB, FLIP", *formats],
         [[row["demo"], *(f"{point['psnr_db']:.1f}, {point['flip']:.4f}" for point in row["formats"])] for row in rows])
+    enough = markdown_table(
+        ["demo", "narrowest format that is enough", "PSNR", "FLIP", "cycles", "chip ≠ model"],
+        [[row["demo"], row["enough"]["format"], f"{row['enough']['psnr_db']} dB", row["enough"]["flip"],
+          f"{row['enough']['cycles']:,}", row["enough"]["rtl_wrong_pixels"]] for row in rows])
     kinds = list(rows[0]["rays_by_kind"]) if rows else []
     by_kind = markdown_table(["demo", *kinds], [[row["demo"], *(f"{row['rays_by_kind'][kind]:,}" for kind in kinds)]
                                                 for row in rows])
@@ -28,7 +32,7 @@ def _demos(results):
         ["demo", *(f"{unit}, busy" for unit in units), *(f"{cache}, hits" for cache in caches)],
         [[row["demo"], *(f"{row['busy'][unit]:.0%}" for unit in units),
           *(f"{row['hit_rate'][cache]:.1%}" if cache in row["hit_rate"] else "–" for cache in caches)] for row in rows])
-    return "\n".join((drawn, by_format, by_kind, work))
+    return "\n".join((drawn, by_format, enough, by_kind, work))
 
 
 def _effects(results):

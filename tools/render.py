@@ -9,7 +9,6 @@ import click
 import numpy as np
 from rich.console import Console
 
-from fpu.reciprocal import MAX_FRAC_WIDTH
 from sim.golden import MAX_DEPTH, SHADINGS, psnr, render_golden
 from sim.scene import Sky, load_scene
 from sim.scene.compile import CompiledScene
@@ -135,10 +134,8 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
 
 
 def _chip_warnings(compiled, order, center):
-    # Roots go by table, which simulated chips with full shading need.
-    most_bits = {"most_bits": MAX_FRAC_WIDTH} if order.is_full and order.engine != "model" else {}
     return [*compiled.warnings, *limit_warnings(compiled.scene, fmt=order.config.fmt, is_flat=compiled.is_flat,
-                                                from_eye=center == "eye", **most_bits)]
+                                                from_eye=center == "eye")]
 
 
 def _is_gif(path):

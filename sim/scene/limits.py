@@ -55,7 +55,7 @@ FLAT = Limit(1e3, "scaled instance", 0, "flattened along one axis to a part in {
              "flatten the mesh itself, or split it")
 
 
-def limit_warnings(scene, *, fmt, is_flat, from_eye=True, most_bits=_MOST_BITS):
+def limit_warnings(scene, *, fmt, is_flat, from_eye=True):
     """A sentence for each limit that something in a scene is beyond, naming what, how far, and what would help.
 
     Parameters
@@ -66,8 +66,6 @@ def limit_warnings(scene, *, fmt, is_flat, from_eye=True, most_bits=_MOST_BITS):
     is_flat, from_eye : bool
         As it is compiled: all triangles in one space, or instances placed as seen from the eye, which sees all of them
         equally fine.
-    most_bits : int
-        Fraction bits of the widest format that there is.
     """
     shown = [instance for instance in scene.instances if scene.meshes[instance.mesh].usable.any()]
     names = [instance.name for instance in shown]
@@ -80,7 +78,7 @@ def limit_warnings(scene, *, fmt, is_flat, from_eye=True, most_bits=_MOST_BITS):
         scales = np.linalg.svd(np.array([instance.transform[:, :3] for instance in shown]), compute_uv=False)
         found += [(STRETCHED, "object", names, scales[:, 0] / scales[:, 1]),
                   (FLAT, "object", names, scales[:, 1] / scales[:, 2])]
-    return [_sentence(limit, kind, names, ratios, fmt, most_bits) for limit, kind, names, ratios in found
+    return [_sentence(limit, kind, names, ratios, fmt) for limit, kind, names, ratios in found
             if (ratios > limit.at(fmt)).any()]
 
 
@@ -106,14 +104,14 @@ def _thinness(mesh):
         return (longest**2 / double_area).max()
 
 
-def _sentence(limit, kind, names, ratios, fmt, most_bits):
+def _sentence(limit, kind, names, ratios, fmt):
     most, worst = limit.at(fmt), np.argsort(-ratios)
     beyond = [names[k] for k in worst if ratios[k] > most]
     named = ", ".join(f"'{name}'" for name in beyond[:_NAMED])
     if len(beyond) > _NAMED:
         named += f" and {len(beyond) - _NAMED} more"
     bits = fmt.frac_width + math.ceil(math.log2(min(ratios[worst[0]] / most, 2.0**64)))
-    more = f"use --format {fmt.exp_width}.{bits}, or " if bits <= most_bits else ""
+    more = f"use --format {fmt.exp_width}.{bits}, or " if bits <= _MOST_BITS else ""
     plural = ("meshes" if kind == "mesh" else f"{kind}s") if len(beyond) > 1 else kind
     return (f"{plural} {named}: {limit.says.format(ratios[worst[0]])}, beyond the {most:,.0f} that format {fmt} is "
             f"good for; {more}{limit.remedy}")

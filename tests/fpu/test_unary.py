@@ -6,7 +6,16 @@ from amaranth.hdl import Module, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from fpu import FloatFormat, Reciprocal, ReciprocalSquareRoot, Rounding, SquareRoot, TableDivider
+from fpu import (
+    DigitReciprocalSquareRoot,
+    FloatFormat,
+    Reciprocal,
+    ReciprocalSquareRoot,
+    Rounding,
+    SquareRoot,
+    TableDivider,
+    reciprocal_square_root_for,
+)
 from fpu.reciprocal_square_root import _roots
 from fpu.table import LineTable
 from tests.fpu import reference
@@ -15,9 +24,11 @@ from tests.fpu.verilated import Bank
 TINY, TINIEST = FloatFormat(3, 2), FloatFormat(2, 3)
 SMALL, DEFAULT, SINGLE = FloatFormat(5, 10), FloatFormat(7, 16), FloatFormat(8, 23)
 EXACT = {Reciprocal: reference.reciprocal, SquareRoot: reference.square_root,
-         ReciprocalSquareRoot: reference.reciprocal_square_root}
+         ReciprocalSquareRoot: reference.reciprocal_square_root,
+         DigitReciprocalSquareRoot: reference.reciprocal_square_root}
 # One more than the steps there are to put registers behind
-MAX_LATENCY = {Reciprocal: 9, SquareRoot: 8, ReciprocalSquareRoot: 12}
+MAX_LATENCY = {Reciprocal: 9, SquareRoot: 8, ReciprocalSquareRoot: 12,
+               DigitReciprocalSquareRoot: 12}
 
 
 class OfTwo(wiring.Component):
@@ -51,7 +62,7 @@ def bank(tmp_path_factory):
             operators += [build(cls, fmt, latency=latency, rounding=rounding)
                           for fmt in (TINY, TINIEST) for latency in range(most + 1)]
             operators += [build(cls, fmt, rounding=rounding) for fmt in (SMALL, DEFAULT)]
-    operators.append(SquareRoot(SINGLE))
+    operators += [SquareRoot(SINGLE), DigitReciprocalSquareRoot(SINGLE)]
     return Bank([OfTwo(operator) for operator in operators], tmp_path_factory.mktemp("unary"))
 
 
@@ -142,5 +153,26 @@ def test_lines_err_as_far_above_as_below():
 def test_too_wide_for_a_table(cls):
     for make in (cls, cls.default_latency, lambda fmt: cls(fmt, latency=5)):
         with pytest.raises(ValueError, match=r"^By table goes a fraction of up to 16 bits, not 17; take a digit "
-                                             r"recurrence: Divider, SquareRoot$"):
+                                             r"recurrence: Divider, SquareRoot, DigitReciprocalSquareRoot$"):
             make(FloatFormat(7, 17))
+
+
+@pytest.mark.parametrize(("frac_width", "cls"), [
+    (16, ReciprocalSquareRoot), (17, DigitReciprocalSquareRoot), (23, DigitReciprocalSquareRoot)])
+def test_root_for_a_format(frac_width, cls):
+    assert reciprocal_square_root_for(FloatFormat(8, frac_width)) is cls
+
+
+@pytest.mark.parametrize("frac_width", range(17, 24))
+def test_float64_knows_the_side_of_every_reciprocal_root(frac_width):
+    """Of wide significands too: where float64 comes near the middle between two members, it is on the root's side."""
+    for doubled in (1, 2):
+        radicands = np.arange(1 << frac_width, 2 << frac_width) * doubled
+        # In units of half the last place, of which the odd ones are in the middle.
+        roots = 2.0 ** (frac_width + 2) / np.sqrt(radicands * 2.0 ** -frac_width)
+        middles = np.rint(roots)
+        # What three roundings make of one to two significands reaches a millionth of this.
+        near = np.flatnonzero((np.abs(roots - middles) < 2.0 ** -20) & (middles % 2 == 1))
+        for radicand, root, middle in zip(radicands[near], roots[near], middles[near], strict=True):
+            exact_is_above = int(radicand) * int(middle) ** 2 < 1 << 3 * frac_width + 4
+            assert root > middle if exact_is_above else root < middle

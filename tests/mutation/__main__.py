@@ -31,7 +31,7 @@ NEAREST = {f"fpu/{file}.py": f"tests/fpu/{test}.py" for file, test in {
     "convert": "test_convert", "delay": "test_delay", "dot_product": "test_dot_product", "kernel": "test_datapath",
     "graph": "test_datapath", "circuit": "test_datapath", "rom": "test_rom", "table": "test_unary",
     "reciprocal": "test_unary", "reciprocal_square_root": "test_unary", "square_root": "test_unary",
-    "rounding": "test_operations", "format": "test_format"}.items()}
+    "root_recurrence": "test_unary", "rounding": "test_operations", "format": "test_format"}.items()}
 _SECONDS = 1800
 
 

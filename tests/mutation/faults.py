@@ -269,6 +269,14 @@ _BY_FILE = {
         ("is_doubled = ~a.exp[0]", "is_doubled = a.exp[0]", "the radicand is doubled at even exponents"),
         ("exceeds=product[one],", "exceeds=product[one - 1],", "the check looks at the wrong bit"),
     ],
+    "fpu/root_recurrence.py": [
+        ("Mux(is_less == s.was_less, s.triple, s.radicand)", "Mux(is_less == s.was_less, s.radicand, s.triple)",
+         "two digits alike add the radicand once"),
+        ("(ChainBit.CARRY, ~s.was_less, 0, 0)", "(ChainBit.CARRY, Const(0, 1), 0, 0)",
+         "what is subtracted lacks its carry"),
+        ("Cat(~s.left[-1], s.root, Const(0, 1))", "Cat(Const(0, 1), s.root, Const(0, 1))",
+         "the last digit of a reciprocal root is forgotten"),
+    ],
     "fpu/table.py": [
         ("(error.max(1, keepdims=True) + error.min(1, keepdims=True)) / 2", "error.max(1, keepdims=True)",
          "a table's lines lie above what they approach"),

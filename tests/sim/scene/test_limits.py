@@ -64,7 +64,7 @@ def test_seen_from_the_eye_nothing_is_far():
 
 
 def test_no_more_bits_than_there_are():
-    text, = limit_warnings(scene_of(FLOOR, sphere(5e-4)), fmt=FORMAT, is_flat=True, most_bits=16)
+    text, = limit_warnings(scene_of(FLOOR, sphere(5e-6)), fmt=FloatFormat(7, 23), is_flat=True)
     assert "--format" not in text
 
 
