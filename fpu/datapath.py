@@ -76,7 +76,7 @@ class Datapath(Graph):
         self.guard_width = guard_width
         self.clock_mhz = clock_mhz
         self._operators = OPERATORS | operators
-        of_powers = dict.fromkeys(("power_max", "power_mul", "power_div"), latencies.get("power", 1))
+        of_powers = dict.fromkeys(("power_max", "power_mul", "power_div", "raised"), latencies.get("power", 1))
         super().__init__(fmt, latencies={"select": latencies.get("select", 0), **of_powers})
         self._given = latencies
 

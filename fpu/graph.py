@@ -224,6 +224,13 @@ class Graph:
         """a/b of two powers; 0/0 = ∞/∞ = 0"""
         return self._node("power_div", a, b)
 
+    def raised(self, a, power):
+        """a and ``power``·2^frac_width units in the last place more, away from 0: an addition of bits
+
+        Beyond its binade the units are those of the next; a power below a unit, or of 1 and more, changes nothing.
+        """
+        return self._node("raised", a, power)
+
     def is_within(self, a, power):
         """|a| < power, a matter of the exponents; false of ∞"""
         return self._node("is_within", a, power, is_flag=True)

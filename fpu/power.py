@@ -7,7 +7,7 @@ from amaranth.hdl import Cat, Const, Mux
 
 from .rounding import emulated
 
-__all__ = ["POWER_EMULATIONS", "POWER_LOGIC", "power", "power_div", "power_max", "power_mul"]
+__all__ = ["POWER_EMULATIONS", "POWER_LOGIC", "power", "power_div", "power_max", "power_mul", "raised"]
 
 
 @emulated
@@ -38,9 +38,21 @@ def power_div(params, a, b):
     return 0.0 if quotient < params[1] else math.inf if quotient > params[2] else quotient
 
 
+@emulated
+def raised(params, a, power):
+    """a and ``power``·2^frac_width units in the last place more, away from 0; of the next binade on its own units."""
+    if a == 0.0 or math.isinf(a) or not math.ldexp(1.0, params[0] - 52) <= power < 1.0:
+        return a
+    binade = math.ldexp(1.0, math.frexp(a)[1])
+    moved = abs(a) + 0.5 * binade * power
+    if moved >= binade:
+        moved += moved - binade
+    return math.copysign(math.inf if moved > params[2] else moved, a)
+
+
 #: Compiled emulation of each operation.
 POWER_EMULATIONS = MappingProxyType({"power": power, "power_max": power_max, "power_mul": power_mul,
-                                     "power_div": power_div})
+                                     "power_div": power_div, "raised": raised})
 
 
 def _fitted(fmt, total, *, is_zero, is_inf):
@@ -71,12 +83,24 @@ def _at_most_one_plus(a, power):
     return a.sign | (a.exp < bias) | (a.exp == bias) & (~over | ~a.frac.any())
 
 
+def _raised(a, power):
+    fmt = a.shape()
+    lowest = fmt.bias - fmt.frac_width
+    units = Cat(power.exp == lowest + place if lowest + place > 0 else Const(0, 1) for place in range(fmt.frac_width))
+    # A carry out of the fraction is the next binade.
+    moved = Cat(a.frac, a.exp) + Mux(a.exp == 0, 0, units)
+    frac, exp = moved[:fmt.frac_width], moved[fmt.frac_width:][:fmt.exp_width]
+    is_inf = a.exp.all() | exp.all()
+    return Cat(frac & ~is_inf.replicate(fmt.frac_width), exp | is_inf.replicate(fmt.exp_width), a.sign)
+
+
 #: What an operation is in terms of its operands.
 POWER_LOGIC = MappingProxyType({
     "power": lambda a: Cat(Const(0, a.shape().frac_width), a.exp),
     "power_max": lambda a, b: Cat(Const(0, a.shape().frac_width), Mux(a.exp >= b.exp, a.exp, b.exp)),
     "power_mul": _mul,
     "power_div": _div,
+    "raised": _raised,
     "is_within": lambda a, power: a.exp < power.exp,
     "is_at_most_one_plus": _at_most_one_plus,
 })

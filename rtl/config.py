@@ -9,6 +9,8 @@ from .arithmetic import ARITHMETICS
 from .program.features import ShaderFeatures
 from .shader_program import shader_program, stack_words
 
+_EDGE_TOLERANCE = 8
+
 
 @dataclass(frozen=True)
 class ChipConfig:
@@ -45,7 +47,7 @@ class ChipConfig:
         Which of :data:`~rtl.arithmetic.ARITHMETICS` it computes by.
     edge_tolerance : int
         By how much edges of triangles give, in units in the last place of what was added up: a power of two up to 64,
-        or 0 for none. Not with fused sums, whose products are not seen.
+        or 0 for none. Not with fused sums, whose products are not seen; so the default is 8, but none with these.
     num_pipelines : int
         Pipelines behind one ray generation controller, 1…4.
     shader : :class:`~rtl.program.features.ShaderFeatures`, optional
@@ -80,7 +82,7 @@ class ChipConfig:
     index_width: int = 24
     coord_width: int = 12
     arithmetic: int = 0
-    edge_tolerance: int = 0
+    edge_tolerance: int | None = None
     num_pipelines: int = 1
     shader: ShaderFeatures | None = None
     num_shaders: int = 1
@@ -90,6 +92,9 @@ class ChipConfig:
     texture_line_items: int = 4
 
     def __post_init__(self):
+        if self.edge_tolerance is None:
+            is_fused = self.arithmetic in range(len(ARITHMETICS)) and ARITHMETICS[self.arithmetic].fused
+            object.__setattr__(self, "edge_tolerance", 0 if is_fused else _EDGE_TOLERANCE)
         ranges = {
             "add_latency": (0, 32), "mul_latency": (0, 32), "div_latency": (0, 64), "cmp_latency": (0, 8),
             "num_threads": (1, 64), "stack_depth": (1, 64), "mailbox_entries": (0, 16),

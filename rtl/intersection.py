@@ -9,7 +9,7 @@ from fpu import Delay
 from .arithmetic import ARITHMETICS
 from .block_memory import BlockMemory
 from .layout import PACKET_RAYS, scale_layout, thread_width, token_layout, vector_layout, with_token
-from .unit_triangle import unit_triangle
+from .unit_triangle import MARGIN, unit_triangle
 
 __all__ = ["Intersection", "hit_layout", "limits_layout", "unit_triangle"]
 
@@ -33,8 +33,9 @@ def limits_layout(*, fmt, index_width):
 class Intersection(wiring.Component):
     """Tests a ray against the unit triangle each clock, and keeps each ray's closest hit.
 
-    A hit at the same distance as an earlier one does not replace it. A ray for which any hit will do has its distance
-    set to 0 by a solid triangle, so that nothing is nearer from then on.
+    A hit at the same distance as an earlier one does not replace it. With a tolerance it is not distances that are
+    compared and kept for the stack, but keys, see :func:`~rtl.unit_triangle.unit_triangle`. A ray for which any hit
+    will do has its distance set to 0 by a solid triangle, so that nothing is nearer from then on.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ class Intersection(wiring.Component):
         record is that of a hit there of triangle number all ones (if ``limited``)
     entered : ``{"valid", "thread", "index"}``: the packet's next hits belong to that instance
     tested : stream of tokens: a packet's rays are through, and its token knows which have a hit
-    hit_address, hit_distances : a thread; two cycles later, t of each ray's hit
+    hit_address, hit_distances : a thread; two cycles later, of each ray's hit what the next has to be nearer than
     record_address, record : for each reader, a thread and a ray; two cycles later, its hit
     busy : a ray is taken in
     """
@@ -150,9 +151,9 @@ class Intersection(wiring.Component):
             test.t_hit.eq(distances.data),
         ]
 
-        found = Signal(data.StructLayout({"hit": 1, "nearer": 1, "t": self._fmt, "u": self._fmt, "v": self._fmt}),
-                       reset_less=True)
-        m.d.sync += [found[name].eq(getattr(test, name)) for name in ("hit", "nearer", "t", "u", "v")]
+        found = Signal(data.StructLayout({"hit": 1, "nearer": 1, "t": self._fmt, "u": self._fmt, "v": self._fmt,
+                                          **({"key": self._fmt} if self._tolerance else {})}), reset_less=True)
+        m.d.sync += [found[name].eq(getattr(test, name)) for name in found.shape().members]
         done = to_end.o
         before = Signal(PACKET_RAYS)
         now = Signal(PACKET_RAYS)
@@ -172,11 +173,15 @@ class Intersection(wiring.Component):
 
         m.submodules.instances = instances = memory.Memory(shape=self._index_width, depth=num_slots, init=[])
         entered_write, instance_read = instances.write_port(), instances.read_port(domain="comb")
-        # What is written to the distances: a hit's, or the one that a ray begins with.
+        # What is written to the distances: a hit's, or the one that a ray begins with. A record has its t.
         new = Signal(data.StructLayout({"valid": 1, "thread": done.token.thread.shape(), "ray": range(PACKET_RAYS),
                                         "t": self._fmt}))
         m.d.comb += [new.valid.eq(better), new.thread.eq(done.token.thread), new.ray.eq(done.ray),
-                     new.t.eq(Mux(is_over, self._fmt.const(0.0), found.t))]
+                     new.t.eq(Mux(is_over, self._fmt.const(0.0), found.key if self._tolerance else found.t))]
+        record_t = new.t
+        if self._tolerance:
+            record_t = Signal(self._fmt)
+            m.d.comb += record_t.eq(Mux(is_over, self._fmt.const(0.0), found.t))
         m.submodules.records = records = memory.Memory(shape=self._record, depth=PACKET_RAYS * num_slots, init=[])
         record_write = records.write_port()
         m.d.comb += [
@@ -188,7 +193,7 @@ class Intersection(wiring.Component):
             distances.write.address.eq(Cat(new.ray, new.thread)),
             distances.write.data.eq(new.t),
             record_write.addr.eq(Cat(new.ray, new.thread)),
-            record_write.data.t.eq(new.t),
+            record_write.data.t.eq(record_t),
             record_write.data.u.eq(found.u),
             record_write.data.v.eq(found.v),
             record_write.data.cosine.eq(done.cosine),
@@ -222,6 +227,8 @@ class Intersection(wiring.Component):
                              new.thread.eq(self.limit.payload.thread), new.ray.eq(self.limit.payload.ray),
                              new.t.eq(self.limit.payload.t_far),
                              record_write.data.triangle.eq(~0)]
+                if self._tolerance:
+                    m.d.comb += record_t.eq(self.limit.payload.t_far)
             m.d.comb += self.limit.ready.eq(~better)
             self._limit(m, test, to_ask.o, to_end.o, cycles=latency - ask_at, instances=instances,
                         allowed=allowed, is_over=is_over)
@@ -236,7 +243,8 @@ class Intersection(wiring.Component):
         for name, scale in (("origin", origin_scale), ("direction", vector.scale)):
             for number, axis in enumerate("xyz"):
                 m.d.comb += getattr(test, f"{name}_scale_{axis}").exp.eq(scale[number])
-        m.d.comb += test.tolerance.eq(fmt.const(self._tolerance * 2.0**-fmt.frac_width))
+        m.d.comb += [test.tolerance.eq(fmt.const(self._tolerance * 2.0**-fmt.frac_width)),
+                     test.margin.eq(fmt.const(MARGIN * self._tolerance * 2.0**-fmt.frac_width))]
 
     def _limit(self, m, test, asking, done, *, cycles, instances, allowed, is_over):
         """Looks up the limits of the ray ``asking``, ``cycles`` before it is ``done``."""

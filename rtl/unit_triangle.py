@@ -4,10 +4,12 @@ from fpu import Datapath, Vector
 
 from .arithmetic import ARITHMETICS
 
-__all__ = ["MAX_TOLERANCE", "edge_errors", "edge_scales", "inside_edges", "unit_triangle"]
+__all__ = ["MARGIN", "MAX_TOLERANCE", "edge_errors", "edge_scales", "inside_edges", "unit_triangle"]
 
 #: No edge gives by more, in u and v: seen so exactly from its edge that t is lost, a triangle would reach out.
 MAX_TOLERANCE = 2.0**-6
+#: Tolerances by which a hit that is inside by tolerance alone counts as farther than it is.
+MARGIN = 4
 
 
 def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False, tolerant=False):
@@ -24,13 +26,17 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
     added up. What rounding them does to O′x is the first term; the second is what t does, which divides by D′z = D·N
     and loses what that has lost, where a ray grazes. What is 0 or more is inside whatever ε is.
 
+    Where triangles overlap by their tolerance, the one that is hit without it is the one that is there. So what counts
+    is not t but ``key``: t, and for a hit by tolerance alone a ``margin`` more, see :meth:`~fpu.graph.Graph.raised`.
+    ``nearer`` is key < t_hit then, the nearest key so far, which depends on no order.
+
     Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator; if tolerant, a few
-    additions and comparisons of exponents.
+    additions and comparisons of exponents, and an addition of a constant to bits.
     """
     dp = Datapath(fmt, latencies=latencies, **arithmetic.parameters)
     origin, direction = dp.vector("origin"), dp.vector("direction")
     t = dp.neg(dp.div(origin.z, direction.z))
-    t_hit = dp.input("t_hit", delay=dp.arrival(t))
+    key = t
     u = dp.add(origin.x, dp.mul(t, direction.x))
     v = dp.add(origin.y, dp.mul(t, direction.y))
     if tolerant:
@@ -38,9 +44,10 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
         # A constant that needs no registers
         tolerance = dp.input("tolerance", delay=max(map(dp.arrival, errors)))
         inside = inside_edges(dp, u, v, [dp.power_mul(error, tolerance) for error in errors])
+        key = dp.select(_is_inside(dp, u, v), t, dp.raised(t, dp.input("margin", delay=dp.arrival(t))))
     else:
-        inside = dp.logical_and(
-            dp.logical_not(dp.is_negative(u)), dp.logical_not(dp.is_negative(v)), dp.is_at_most_one(dp.add(u, v)))
+        inside = _is_inside(dp, u, v)
+    t_hit = dp.input("t_hit", delay=dp.arrival(key))
     if near:
         ahead = dp.logical_and(dp.is_finite(t), dp.lt(dp.input("t_near", delay=dp.arrival(t)), t))
     else:
@@ -49,8 +56,15 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
     dp.output("u", u)
     dp.output("v", v)
     dp.output("hit", dp.logical_and(ahead, inside))
-    dp.output("nearer", dp.lt(t, t_hit))
+    dp.output("nearer", dp.lt(key, t_hit))
+    if tolerant:
+        dp.output("key", key)
     return dp
+
+
+def _is_inside(dp, u, v):
+    return dp.logical_and(dp.logical_not(dp.is_negative(u)), dp.logical_not(dp.is_negative(v)),
+                          dp.is_at_most_one(dp.add(u, v)))
 
 
 def edge_scales(dp):

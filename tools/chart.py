@@ -22,7 +22,8 @@ __all__ = ["chart"]
 SIZE = 384, 288
 FORMATS = ("5.8", "5.10", "6.10", "6.12", "7.12", "6.14", "7.14", "7.16", "7.18", "7.20", "7.23", "8.23")
 #: Parameters of chips that differ in their pictures, by name.
-VARIANTS = {**{name: {"arithmetic": NUMBERS[name]} for name in ("separate", "fused", "truncated", "reciprocal")},
+VARIANTS = {**{name: {"arithmetic": NUMBERS[name], "edge_tolerance": 0}
+               for name in ("separate", "fused", "truncated", "reciprocal")},
             **{f"tolerant {ulp}": {"edge_tolerance": ulp} for ulp in (2, 4, 8)}}
 _SCENES = (*SCENES, ("sunflowers", None, None))
 _ROOT = Path(__file__).parents[1]

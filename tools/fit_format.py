@@ -8,8 +8,8 @@ from rtl.arithmetic import NUMBERS
 __all__ = ["VARIANTS", "Candidate", "FormatSearch"]
 
 #: Ways to compute that draw different pictures: parameters of a chip by name.
-VARIANTS = {"separate": {}, **{f"tolerant {ulp}": {"edge_tolerance": ulp} for ulp in (1, 2, 4, 8)},
-            **{name: {"arithmetic": NUMBERS[name]} for name in ("fused-narrow", "truncated")}}
+VARIANTS = {"separate": {"edge_tolerance": 0}, **{f"tolerant {ulp}": {"edge_tolerance": ulp} for ulp in (1, 2, 4, 8)},
+            **{name: {"arithmetic": NUMBERS[name], "edge_tolerance": 0} for name in ("fused-narrow", "truncated")}}
 _EXPONENTS, _FRACTIONS = range(5, 9), range(10, 24)
 #: Fraction bits in which exponents are compared: enough for all scenes of the chart.
 _AMPLE = 20

@@ -37,13 +37,8 @@ class Chip:
 def _with(*features):
     """The least shader, which has a directional light and no more, with ``features``."""
     switches = dict.fromkeys(SWITCHES, False) | dict.fromkeys(("directional_lights", *features), True)
-    return ChipConfig(shader=ShaderFeatures(**switches, depth=DEPTH if SENDING.intersection(features) else 0))
-
-
-def _without(feature):
-    """Everything but ``feature`` and what needs it to be had."""
-    lost = {feature} | ({"refraction"} if feature == "reflection" else set())
-    return ChipConfig(shader=replace(ShaderFeatures(depth=DEPTH), **dict.fromkeys(lost, False)))
+    return ChipConfig(edge_tolerance=0,
+                      shader=ShaderFeatures(**switches, depth=DEPTH if SENDING.intersection(features) else 0))
 
 
 def _words(feature):
@@ -52,8 +47,10 @@ def _words(feature):
 
 def _chips():
     least, everything = "least shader", "everything"
-    whole = ChipConfig(shader=ShaderFeatures(depth=DEPTH))
-    yield Chip(name="simple", config=ChipConfig())
+    whole = ChipConfig(edge_tolerance=0, shader=ShaderFeatures(depth=DEPTH))
+    simple = ChipConfig(edge_tolerance=0)
+    yield Chip(name="simple", config=simple)
+    yield Chip(name="simple + edge tolerance", beside="simple", config=ChipConfig())
     yield Chip(name=least, beside="simple", config=_with())
     for feature in SWITCHES:
         if feature == "directional_lights":
@@ -63,9 +60,6 @@ def _chips():
         yield Chip(name=f"{base} + {_words(feature)}", beside=base,
                    config=_with(*filter(None, (needed, feature))))
     yield Chip(name=everything, beside=least, config=whole)
-    for feature in SWITCHES:
-        also = ", refraction" if feature == "reflection" else ""
-        yield Chip(name=f"{everything} without {_words(feature)}{also}", beside=everything, config=_without(feature))
     yield Chip(name=f"{everything} without secondary rays", beside=everything,
                config=replace(whole, shader=replace(whole.shader, depth=0)))
     for shaders in (2, 4):

@@ -7,7 +7,7 @@ from .page import markdown_table
 __all__ = ["PARTS", "SHOWN", "rates"]
 
 #: Methods whose limits and plots are shown.
-SHOWN = ("printed", "default", "tolerant 8", "Woop 2013")
+SHOWN = ("printed", "firm edges", "default", "Woop 2013")
 
 
 def rates(results):

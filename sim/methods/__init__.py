@@ -5,13 +5,13 @@ from .method import Method
 from .moller_trumbore import MOLLER_TRUMBORE
 from .plucker import PLUCKER, PLUCKER_RELATIVE
 from .projection import PROJECTION
-from .tolerant import TOLERANCES, tolerant
-from .unit_triangle import DEFAULT, FUSED, PRINTED
+from .tolerant import DEFAULT, TOLERANCES, tolerant
+from .unit_triangle import FIRM, FUSED, PRINTED
 from .watertight import WATERTIGHT
 
 __all__ = ["DEFAULT", "METHODS", "Answers", "Method", "Pairs", "closest_hits", "near_pairs"]
 
 #: All of them by name.
 METHODS = {method.name: method for method in (
-    PRINTED, DEFAULT, FUSED, *map(tolerant, TOLERANCES), tolerant(8, bound="products"), tolerant(8, bound="terms"),
-    MOLLER_TRUMBORE, PLUCKER, PLUCKER_RELATIVE, PROJECTION, WATERTIGHT)}
+    PRINTED, FIRM, FUSED, DEFAULT, *map(tolerant, TOLERANCES), tolerant(8, bound="products"),
+    tolerant(8, bound="terms"), MOLLER_TRUMBORE, PLUCKER, PLUCKER_RELATIVE, PROJECTION, WATERTIGHT)}

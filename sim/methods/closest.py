@@ -132,21 +132,20 @@ def closest_hits(method, fmt, corners, origins, directions, pairs, *, excluded=N
     stored, usable = method.store(fmt, corners)
     rays = method.begin(fmt, origins, directions)
     t, triangle = np.full(len(origins), np.inf), np.full(len(origins), -1)
-    is_odd = np.zeros(len(origins), np.bool_)
+    nearest, is_odd = np.full(len(origins), np.inf), np.zeros(len(origins), np.bool_)
     ray_of = pairs.ray
     for start in range(0, len(ray_of), _BATCH):
         ray, of = ray_of[start:start + _BATCH], pairs.triangle[start:start + _BATCH]
         keeps = usable[of] if excluded is None else usable[of] & (excluded[ray] != of)
         ray, of = ray[keeps], of[keeps]
-        t_pair, u, v, hit = method.test(fmt, {name: value[of] for name, value in stored.items()},
-                                        {name: value[ray] for name, value in rays.items()})
+        t_pair, u, v, hit, key = method.test(fmt, {name: value[of] for name, value in stored.items()},
+                                             {name: value[ray] for name, value in rays.items()})
         is_odd[ray[np.isnan(t_pair) | np.isnan(u) | np.isnan(v)]] = True
-        ray, of, t_pair = ray[hit], of[hit], t_pair[hit]
+        ray, of, t_pair, key = ray[hit], of[hit], t_pair[hit], key[hit]
         # The nearest of each ray comes last, so that it is what stays.
-        order = np.lexsort((-t_pair, ray))
-        ray, of, t_pair = ray[order], of[order], t_pair[order]
-        last = np.append(ray[1:] != ray[:-1], True)[:len(ray)]
-        ray, of, t_pair = ray[last], of[last], t_pair[last]
-        nearer = t_pair < t[ray]
-        t[ray[nearer]], triangle[ray[nearer]] = t_pair[nearer], of[nearer]
+        order = np.lexsort((-key, ray))
+        order = order[np.append(ray[order][1:] != ray[order][:-1], True)[:len(ray)]]
+        order = order[key[order] < nearest[ray[order]]]
+        ray = ray[order]
+        t[ray], triangle[ray], nearest[ray] = t_pair[order], of[order], key[order]
     return Answers(t, triangle, is_odd)

@@ -27,12 +27,14 @@ class Method:
     stored : callable
         ``stored(corners)``: what is kept of triangles float64[T, 3, 3], as the test's inputs by name.
     datapath : callable
-        ``datapath(fmt)``: the test, with the outputs t, u, v and ``hit``.
+        ``datapath(fmt)``: the test, with the outputs t, u, v and ``hit``, and ``key`` if it is not t that counts.
     per_ray : callable or None
         ``per_ray(fmt)``: what of a direction is computed once, in place of which the test takes it.
     point_map : callable or None
         ``point_map(fmt)``: an affine map of origins (``is_point``) and directions before the test, which has
         ``result_x`` … as its ``origin`` and ``direction``, and what else it gives under ``origin_…``, ``direction_…``.
+    constants : callable
+        ``constants(fmt)``: inputs of the test by name that are always the same.
     needs_area : bool
         Triangles without area cannot be stored, and are left out.
     """
@@ -42,6 +44,7 @@ class Method:
     datapath: object
     per_ray: object = None
     point_map: object = None
+    constants: object = lambda fmt: {}
     needs_area: bool = False
 
     def store(self, fmt, corners):
@@ -74,7 +77,7 @@ class Method:
         return rays | built(self.per_ray, fmt).model(**named("direction", directions))
 
     def test(self, fmt, triangles, rays):
-        """(t, u, v, hit) of a ray and a triangle in each place of the arrays of :meth:`begin` and :meth:`store`."""
+        """(t, u, v, hit, key) of a ray and a triangle in each place of arrays of :meth:`begin` and :meth:`store`."""
         if self.point_map is not None:
             mapped = built(self.point_map, fmt)
             moved = {}
@@ -84,9 +87,9 @@ class Method:
                 moved |= {f"{name}_{output.removeprefix('result_')}": value for output, value in results.items()}
             triangles, rays = {}, moved
         test = built(self.datapath, fmt)
-        given = {"t_hit": np.inf, **triangles, **rays}
+        given = {"t_hit": np.inf, **self.constants(fmt), **triangles, **rays}
         results = test.model(**{name: given[name] for name in test.input_names})
-        return results["t"], results["u"], results["v"], results["hit"]
+        return *(results[name] for name in ("t", "u", "v", "hit")), results.get("key", results["t"])
 
     def cost(self, fmt):
         """Operators for a test a clock, as :meth:`~fpu.Datapath.cost`; those that a ray takes once are apart."""

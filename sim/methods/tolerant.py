@@ -4,18 +4,19 @@ import math
 
 from fpu import Datapath
 from rtl.affine_map import affine_map
-from rtl.unit_triangle import MAX_TOLERANCE, edge_errors, edge_scales, inside_edges
+from rtl.config import ChipConfig
+from rtl.unit_triangle import MARGIN, MAX_TOLERANCE, edge_scales, inside_edges, unit_triangle
 
 from .method import Method
 from .parts import outputs
 from .unit_triangle import stored_matrix
 
-__all__ = ["BOUNDS", "TOLERANCES", "scaled_map", "tolerant", "tolerant_test"]
+__all__ = ["BOUNDS", "DEFAULT", "TOLERANCES", "scaled_map", "tolerant", "tolerant_test"]
 
-#: k of the methods.
-TOLERANCES = (2, 4, 8, 16)
-#: What bounds the error of u, see :func:`tolerant_test`.
-BOUNDS = ("lean", "full", "products", "terms")
+#: k of the methods, besides the chip's.
+TOLERANCES = (2, 4, 16)
+#: What else than the chip's may bound the error of u, see :func:`tolerant_test`.
+BOUNDS = ("full", "products", "terms")
 
 
 def scaled_map(fmt):
@@ -23,8 +24,8 @@ def scaled_map(fmt):
     return affine_map(fmt, scaled=True)
 
 
-def tolerant_test(fmt, *, ulp, bound=BOUNDS[0], cap=MAX_TOLERANCE, latencies=None):
-    """The chip's test with u > −ε_u, v > −ε_v and u + v < 1 + max(ε_u, ε_v).
+def tolerant_test(fmt, *, ulp, bound, cap=MAX_TOLERANCE, latencies=None):
+    """As the chip's test u > −ε_u, v > −ε_v and u + v < 1 + max(ε_u, ε_v).
 
     ::
 
@@ -33,9 +34,8 @@ def tolerant_test(fmt, *, ulp, bound=BOUNDS[0], cap=MAX_TOLERANCE, latencies=Non
     where E, of powers of two alone, is by ``bound``
 
     ==========  =====================================================================================================
-    lean        max(s(O′x), |w|·s(D′z)/|D′z|), the chip's own: s is the largest of the products that were added up, so
-                s(a)/|a| is what a has lost to cancellation. D′z = D·N loses where the ray grazes, and O′z alike
-    full        max(s(O′x), t·s(D′x), |w|·max(s(O′z)/|O′z|, s(D′z)/|D′z|))
+    full        max(s(O′x), t·s(D′x), |w|·max(s(O′z)/|O′z|, s(D′z)/|D′z|)): s is the largest of the products that were
+                added up, so s(a)/|a| is what a has lost to cancellation
     products    max(s(O′x), t·s(D′x))
     terms       max(|O′x|, |w|)
     ==========  =====================================================================================================
@@ -51,9 +51,7 @@ def tolerant_test(fmt, *, ulp, bound=BOUNDS[0], cap=MAX_TOLERANCE, latencies=Non
     scales = {} if bound == "terms" else edge_scales(dp)
     t = dp.neg(dp.div(origin.z, direction.z))
     ways = [dp.mul(t, direction.x), dp.mul(t, direction.y)]
-    if bound == "lean":
-        errors = edge_errors(dp, t, direction, **scales)
-    elif bound == "terms":
+    if bound == "terms":
         errors = [dp.power_max(dp.power(start), dp.power(way)) for start, way in zip(origin, ways, strict=False)]
     else:
         errors = _errors_of_products(dp, t, origin, direction, ways, full=bound == "full", **scales)
@@ -73,8 +71,8 @@ def _errors_of_products(dp, t, origin, direction, ways, *, origin_scale, directi
     return errors
 
 
-def tolerant(ulp, *, bound=BOUNDS[0], cap=MAX_TOLERANCE):
-    """The method with a tolerance of ``ulp`` units in the last place.
+def tolerant(ulp, *, bound=None, cap=MAX_TOLERANCE, name=None):
+    """The method with a tolerance of ``ulp`` units in the last place, by the chip's own bound unless one is named.
 
     Raises
     ------
@@ -83,11 +81,21 @@ def tolerant(ulp, *, bound=BOUNDS[0], cap=MAX_TOLERANCE):
     """
     if ulp <= 0 or math.log2(ulp) % 1 or math.log2(cap) % 1:
         raise ValueError(f"Tolerance and cap must be powers of two, not {ulp!r} and {cap!r}")
-    if bound not in BOUNDS:
+    if bound not in (None, *BOUNDS):
         raise ValueError(f"Bound must be one of {', '.join(BOUNDS)}, not {bound!r}")
+    if bound is None:
+        return Method(name or f"tolerant {ulp}", stored_matrix, _chip_test, point_map=scaled_map, needs_area=True,
+                      constants=lambda fmt: {"tolerance": ulp * 2.0**-fmt.frac_width,
+                                             "margin": MARGIN * ulp * 2.0**-fmt.frac_width})
 
     def test(fmt):
         return tolerant_test(fmt, ulp=ulp, bound=bound, cap=cap)
 
-    return Method(f"tolerant {ulp}" if bound == BOUNDS[0] else f"{bound} {ulp}", stored_matrix, test,
-                  point_map=scaled_map, needs_area=True)
+    return Method(f"{bound} {ulp}", stored_matrix, test, point_map=scaled_map, needs_area=True)
+
+
+def _chip_test(fmt):
+    return unit_triangle(fmt, tolerant=True)
+
+
+DEFAULT = tolerant(ChipConfig().edge_tolerance, name="default")

@@ -1,4 +1,4 @@
-"""Tests by the unit triangle: the paper's, the chip's, and the chip's with fused sums."""
+"""Tests by the unit triangle without a tolerance: the paper's, the chip's, and the chip's with fused sums."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ..scene.triangles import unit_triangle_maps
 from .method import Method
 from .parts import dot, named
 
-__all__ = ["DEFAULT", "FUSED", "PRINTED", "printed_map", "stored_matrix"]
+__all__ = ["FIRM", "FUSED", "PRINTED", "printed_map", "stored_matrix"]
 
 _FUSED = next(arithmetic for arithmetic in ARITHMETICS if arithmetic.name == "fused")
 
@@ -52,5 +52,5 @@ def _fused_map(fmt):
 
 
 PRINTED = Method("printed", _stored_offset, unit_triangle, point_map=printed_map, needs_area=True)
-DEFAULT = Method("default", stored_matrix, unit_triangle, point_map=affine_map, needs_area=True)
+FIRM = Method("firm edges", stored_matrix, unit_triangle, point_map=affine_map, needs_area=True)
 FUSED = Method("fused", stored_matrix, unit_triangle, point_map=_fused_map, needs_area=True)

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from rtl.unit_triangle import MARGIN
+
 from ..scene.image import INDEX_MASK, INSTANCE_ENTRY, LAST_ENTRY, LOWER_EMPTY, SOLID_ENTRY, UPPER_EMPTY
 from .compiled import compiled
 from .datapaths import affine_map, kd_step, scaled_map, tolerant_triangle, unit_triangle
@@ -92,6 +94,8 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
     next_letter = np.zeros(2, np.int64)
     child_interval = np.empty((2, 4, 2))
 
+    # Of each ray's hit what the next has to be nearer than.
+    nearest = np.empty(4)
     has_distance = 0
     for ray in range(4):
         owners[ray, 0] = owners[ray, 1] = -1
@@ -100,7 +104,7 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
             direction[0, ray] = directions[ray]
             interval[0, ray, 0], interval[0, ray, 1] = 0.0, np.inf
             if flags[ray] & HAS_LIMIT:
-                hits[ray, 0] = limits[ray, 1]
+                hits[ray, 0] = nearest[ray] = limits[ray, 1]
                 has_distance |= 1 << ray
 
     level, node, instance, action = 0, root, -1, _VISIT
@@ -162,7 +166,7 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
             mask = 0
             for ray in range(4):
                 if stack_mask[level, entry] >> ray & 1:
-                    if not has_distance >> ray & 1 or stack_interval[level, entry, ray, 0] <= hits[ray, 0]:
+                    if not has_distance >> ray & 1 or stack_interval[level, entry, ray, 0] <= nearest[ray]:
                         mask |= 1 << ray
             if mask:
                 interval[level] = stack_interval[level, entry]
@@ -226,18 +230,20 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
                     scale = mapped_scale[first]
                     dx, dy, dz, scale_x, scale_y, scale_z = _transform_scaled(
                         arithmetic, params, matrix, direction[level, ray], False)
-                    t, u, v, hit, nearer = tolerant_triangle(
-                        arithmetic, params, here[0], here[1], here[2], dx, dy, dz, hits[ray, 0], scale[0], scale[1],
-                        scale[2], scale_x, scale_y, scale_z, tolerance, limits[ray, 0])
+                    t, u, v, hit, nearer, key = tolerant_triangle(
+                        arithmetic, params, here[0], here[1], here[2], dx, dy, dz, scale[0], scale[1], scale[2],
+                        scale_x, scale_y, scale_z, tolerance, MARGIN * tolerance, nearest[ray], limits[ray, 0])
                 else:
                     dx, dy, dz = transform(arithmetic, params, matrix, direction[level, ray], False)
                     t, u, v, hit, nearer = unit_triangle(arithmetic, params, here[0], here[1], here[2], dx, dy, dz,
-                                                         hits[ray, 0], limits[ray, 0])
+                                                         nearest[ray], limits[ray, 0])
+                    key = t
                 if (hit and (nearer or not has_distance >> ray & 1)
                         and not (index == excluded[ray, 0] and owner == excluded[ray, 1])):
                     hits[ray, 0], hits[ray, 1], hits[ray, 2], hits[ray, 3] = t, u, v, dz
+                    nearest[ray] = key
                     if word & SOLID_ENTRY and flags[ray] & ANY_HIT:
-                        hits[ray, 0] = 0.0
+                        hits[ray, 0] = nearest[ray] = 0.0
                     has_distance |= 1 << ray
                     owners[ray, 0], owners[ray, 1] = index, owner
             action = _POP if is_last[level] else _LIST

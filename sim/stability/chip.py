@@ -6,6 +6,8 @@ from functools import cached_property
 import numba
 import numpy as np
 
+from rtl.config import ChipConfig
+
 from ..methods import Answers
 from ..model.compiled import compiled
 from ..model.packet import COUNTS, trace_packet
@@ -16,18 +18,19 @@ from .truth import judge, scene_of
 
 __all__ = ["ChipProbe", "deep_tree", "in_splitting_planes", "traversed"]
 
-_MAILBOX = 4
+_MAILBOX, _TOLERANCE = ChipConfig().mailbox_entries, ChipConfig().edge_tolerance
 
 
 @compiled(parallel=True)
-def _trace(params, root, nodes, splits, lists, matrices, stack_depth, origins, directions, owners, distances, whole):
+def _trace(params, root, nodes, splits, lists, matrices, stack_depth, tolerance, origins, directions, owners,
+           distances, whole):
     for packet in numba.prange(len(origins) // 4):
         hits, owner = np.empty((4, 4)), np.empty((4, 2), np.int64)
         first = 4 * packet
         whole[packet] = trace_packet(
-            0, params, root, nodes, splits, lists, matrices, _MAILBOX, stack_depth, 0.0, origins[first:first + 4],
-            directions[first:first + 4], 15, np.zeros((4, 2)), np.full((4, 2), -1, np.int64), np.zeros(4, np.int64),
-            False, hits, owner, np.zeros(len(COUNTS), np.int64))
+            0, params, root, nodes, splits, lists, matrices, _MAILBOX, stack_depth, tolerance,
+            origins[first:first + 4], directions[first:first + 4], 15, np.zeros((4, 2)), np.full((4, 2), -1, np.int64),
+            np.zeros(4, np.int64), False, hits, owner, np.zeros(len(COUNTS), np.int64))
         for ray in range(4):
             owners[first + ray] = owner[ray]
             distances[first + ray] = hits[ray, 0] if owner[ray, 0] >= 0 else np.inf
@@ -62,8 +65,8 @@ class ChipProbe:
         owners, distances = np.empty((self.num_rays, 2), np.int64), np.empty(self.num_rays)
         whole = np.zeros(self.num_rays // 4, np.bool_)
         _trace(image.fmt.params, image.root, image.nodes[:, 0].astype(np.int64), image.split_values(),
-               image.lists.astype(np.int64), image.matrix_values(), self.stack_depth, probe.origins,
-               probe.directions, owners, distances, whole)
+               image.lists.astype(np.int64), image.matrix_values(), self.stack_depth,
+               _TOLERANCE * 2.0**-image.fmt.frac_width, probe.origins, probe.directions, owners, distances, whole)
         _, prim = image.owners(owners[:, 0], owners[:, 1])
         return Answers(distances, np.where(owners[:, 0] >= 0, prim, -1), np.repeat(~whole, 4))
 

@@ -20,6 +20,16 @@ def fitted(fmt, a):
     return 0.0 if a < Fraction(fmt.min_normal) else np.inf if a > Fraction(fmt.max) else float(a)
 
 
+def raised(fmt, a, power):
+    """By walking from member to member."""
+    steps = power * 2.0**fmt.frac_width
+    if a == 0.0 or np.isinf(a) or not 1 <= steps < 2.0**fmt.frac_width:
+        return a
+    members = np.unique(np.abs(fmt.decode(np.arange(1 << fmt.width))))
+    place = np.searchsorted(members, abs(a)) + int(steps)
+    return np.copysign(members[min(place, len(members) - 1)], a)
+
+
 def expected(fmt, op, a, b):
     """What the operation's text says, by fractions."""
     x, y = exact(a), exact(b)
@@ -29,6 +39,8 @@ def expected(fmt, op, a, b):
         return 0.0 if 0.0 in (a, b) else np.inf if None in (x, y) else fitted(fmt, x * y)
     if op == "power_div":
         return 0.0 if a == 0.0 or y is None else np.inf if x is None or b == 0.0 else fitted(fmt, x / y)
+    if op == "raised":
+        return raised(fmt, a, b)
     if op == "is_within":
         return x is not None and (y is None or abs(x) < y)
     limit = Fraction(1) if y is None else min(y, Fraction(1))
@@ -36,11 +48,11 @@ def expected(fmt, op, a, b):
 
 
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
-@pytest.mark.parametrize("op", ["power_max", "power_mul", "power_div", "is_within", "is_at_most_one_plus"])
+@pytest.mark.parametrize("op", ["power_max", "power_mul", "power_div", "raised", "is_within", "is_at_most_one_plus"])
 def test_every_pair(fmt, op):
     powers = np.array([0.0, *(2.0 ** np.arange(1 - fmt.bias, fmt.exp_inf - fmt.bias)), np.inf])
     every = np.unique(fmt.decode(np.arange(1 << fmt.width)))
-    first = every if op.startswith("is_") else powers
+    first = every if op == "raised" or op.startswith("is_") else powers
     a, b = (pair.ravel() for pair in np.meshgrid(first, powers))
     dp = Datapath(fmt, latencies={"power": 0})
     dp.output("r", getattr(dp, op)(dp.input("a"), dp.input("b")))

@@ -8,7 +8,7 @@ import pytest
 from fpu import FloatFormat
 from rtl.affine_map import affine_map
 from rtl.arithmetic import ARITHMETICS
-from rtl.unit_triangle import MAX_TOLERANCE, unit_triangle
+from rtl.unit_triangle import MARGIN, MAX_TOLERANCE, unit_triangle
 
 FMT = FloatFormat(7, 16)
 COUNT = 3000
@@ -58,11 +58,15 @@ def test_edges_give_by_what_was_lost(ulp):
               for name, values in (("origin", origin), ("direction", direction))}
     tolerance = ulp * 2.0**-16
     inputs = {f"{name}_{axis}": values[:, k] for name, values in (("origin", origin), ("direction", direction))
-              for k, axis in enumerate("xyz")} | {"t_hit": np.full(COUNT, np.inf)}
+              for k, axis in enumerate("xyz")}
+    # What is to be beaten lies on either side of what is found.
+    t_hit = FMT.quantize(np.abs(t) * (1 + rng.choice([-3, -1, 0, 1, 3, 6], COUNT) * ulp * 2.0**-16))
+    inputs["t_hit"] = np.where(rng.random(COUNT) < 0.1, np.inf, t_hit)
     tolerant = inputs | {f"{name}_scale_{axis}": values[:, k] for name, values in scales.items()
-                         for k, axis in enumerate("xyz")} | {"tolerance": np.full(COUNT, tolerance)}
+                         for k, axis in enumerate("xyz")} | {"tolerance": np.full(COUNT, tolerance),
+                                                           "margin": np.full(COUNT, MARGIN * tolerance)}
     plain, found = unit_triangle(FMT).model(**inputs), unit_triangle(FMT, tolerant=True).model(**tolerant)
-    hits = 0
+    hits = beaten = 0
     for i in range(COUNT):
         u, v, t = (float(plain[name][i]) for name in ("u", "v", "t"))
         assert (u, v, t) == tuple(float(found[name][i]) for name in ("u", "v", "t"))
@@ -74,6 +78,15 @@ def test_edges_give_by_what_was_lost(ulp):
         inside &= total <= 1 or total < 1 + max(limits)
         assert bool(found["hit"][i]) == (inside and 0 < t < np.inf)
         hits += bool(found["hit"][i]) and not plain["hit"][i]
+        # A hit by tolerance alone has to be nearer by the margin.
+        is_firm = u >= 0 and v >= 0 and total <= 1
+        units = 0 if is_firm else MARGIN * ulp
+        bits = FMT.encode(abs(t)) + (units if 0 < abs(t) < np.inf else 0)
+        key = math.copysign(FMT.decode(np.minimum(bits, FMT.exp_inf << FMT.frac_width)), t)
+        assert found["key"][i] == key
+        assert bool(found["nearer"][i]) == (key < inputs["t_hit"][i])
+        beaten += bool(found["nearer"][i]) != bool(plain["nearer"][i])
         # Nothing is lost.
         assert found["hit"][i] or not plain["hit"][i]
     assert hits > COUNT / 200
+    assert beaten > COUNT / 20

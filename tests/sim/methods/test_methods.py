@@ -26,7 +26,7 @@ def test_well_conditioned(method, rays):
     corners, origin, direction, exact, clear = rays
     stored, usable = method.store(FINE, corners)
     assert usable.all()
-    *found, hit = method.test(FINE, stored, method.begin(FINE, origin, direction))
+    *found, hit, _ = method.test(FINE, stored, method.begin(FINE, origin, direction))
     inside = exact[3]
     assert (hit[clear] == inside[clear]).all()
     for value, wanted in zip(found, exact[:3], strict=True):
@@ -35,7 +35,7 @@ def test_well_conditioned(method, rays):
 
 def test_operators():
     costs = {name: method.cost(FMT)[0] for name, method in METHODS.items()}
-    for name in ("printed", "default", "tolerant 8", "terms 8"):
+    for name in ("printed", "firm edges", "default", "terms 8"):
         assert costs[name] == {"add": 12, "mul": 11, "div": 1, "cmp": 1}
     assert costs["fused"] == {"add": 6, "mul": 2, "div": 1, "cmp": 1, "dot": 3}
     assert costs["Möller-Trumbore"] == {"add": 18, "mul": 27, "div": 1, "cmp": 1}
@@ -60,16 +60,16 @@ def test_the_largest_product():
 @pytest.mark.parametrize(("ulp", "options", "message"), [
     (3, {}, r"^Tolerance and cap must be powers of two, not 3 and 0\.015625$"),
     (4, {"cap": 0.3}, r"^Tolerance and cap must be powers of two, not 4 and 0\.3$"),
-    (4, {"bound": "none"}, "^Bound must be one of lean, full, products, terms, not 'none'$")])
+    (4, {"bound": "none"}, "^Bound must be one of full, products, terms, not 'none'$")])
 def test_bad_tolerances(ulp, options, message):
     with pytest.raises(ValueError, match=message):
         tolerant(ulp, **options)
 
 
 @pytest.mark.parametrize(("method", "reach"), [
-    (METHODS["default"], 1), (tolerant(8), 8), (tolerant(2), 2), (tolerant(8, bound="full"), 8),
+    (METHODS["firm edges"], 1), (METHODS["default"], 8), (tolerant(2), 2), (tolerant(8, bound="full"), 8),
     (tolerant(8, bound="products"), 8), (tolerant(8, bound="terms"), 8), (tolerant(2.0**14), 2**10),
-    (tolerant(2.0**14, cap=2.0**-10), 2**6)])
+    (tolerant(2.0**14, bound="terms", cap=2.0**-10), 2**6)])
 def test_tolerance_widens_by_what_it_says(method, reach):
     """Rays that meet the plane a few units in the last place beyond an edge; all terms are 1 there, but for the cap."""
     corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, 1, 0)]])
@@ -80,7 +80,7 @@ def test_tolerance_widens_by_what_it_says(method, reach):
                     np.stack([distance - 0.5, np.full(len(off), 0.5), np.ones(len(off))], axis=1)):
         assert (FMT.quantize(origins) == origins).all()
         rays = method.begin(FMT, origins, np.tile((1.0, 0, -1), (len(off), 1)))
-        *_, hit = method.test(FMT, {key: value[[0] * len(off)] for key, value in stored.items()}, rays)
+        *_, hit, _ = method.test(FMT, {key: value[[0] * len(off)] for key, value in stored.items()}, rays)
         assert hit.tolist() == (off < reach).tolist()
 
 

@@ -116,11 +116,11 @@ def test_what_is_known_to_fail_does():
     case = CASES["edges"]
     probe = case.probe(288, 2000, fmt=FMT, rng=case.rng(288))
     failures = {name: probe.verdict(METHODS[name]).is_failure.sum()
-                for name in ("printed", "default", "tolerant 8", "Woop 2013")}
-    assert 100 < failures["default"] < failures["printed"] < 500
-    assert failures["tolerant 8"] <= 4
+                for name in ("printed", "firm edges", "default", "Woop 2013")}
+    assert 100 < failures["firm edges"] < failures["printed"] < 500
+    assert failures["default"] <= 4
     assert failures["Woop 2013"] == 0
-    assert probe.verdict(METHODS["default"]).is_crack.sum() == failures["default"]
+    assert probe.verdict(METHODS["firm edges"]).is_crack.sum() == failures["firm edges"]
 
 
 def test_rays_without_a_direction_are_left_out():
