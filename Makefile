@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart stability clean
+.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart stability cracks clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -17,6 +17,7 @@ help:
 	@echo "make pipeline     the figures of docs/pipeline.md: full shading on the simulated chip"
 	@echo "make chart        accuracy over formats and arithmetics, for docs/accuracy.md"
 	@echo "make stability    where ray/triangle tests fail, the chip's and others': the figures of docs/accuracy.md"
+	@echo "make cracks       a hundred million rays at the edges of real meshes, for docs/accuracy.md"
 	@echo "make mutants      faults planted in the operators, each found by a test: docs/results/mutants.json"
 
 setup: $(VENV)/.ready
@@ -60,6 +61,9 @@ chart: setup
 
 stability: setup
 	$(BIN)/dynrt stability
+
+cracks: setup
+	$(BIN)/dynrt cracks --scenes $(SCENES)
 
 clean:
 	rm -rf build .pytest_cache .ruff_cache

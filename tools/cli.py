@@ -4,6 +4,7 @@ import click
 
 from .arithmetic import arithmetic
 from .chart import chart
+from .cracks import cracks
 from .first_light import first_light
 from .fit import fit
 from .fpu_report import fpu_report
@@ -23,6 +24,7 @@ def main():
 
 main.add_command(arithmetic)
 main.add_command(chart)
+main.add_command(cracks)
 main.add_command(first_light)
 main.add_command(fit)
 main.add_command(fpu_report)

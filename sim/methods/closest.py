@@ -52,6 +52,10 @@ class Answers:
     triangle: np.ndarray
     is_odd: np.ndarray
 
+    def of(self, rays):
+        """The answers of some rays, by an index array."""
+        return Answers(self.t[rays], self.triangle[rays], self.is_odd[rays])
+
 
 @numba.njit(cache=True, error_model="numpy")
 def _meets(lower, upper, origin, direction):
