@@ -165,7 +165,8 @@ class DynRTP(wiring.Component):
             m.d.comb += mailboxed_list.begin.valid.eq(color.start.valid)
             m.d.comb += mailboxed_list.begin.thread.eq(color.start.payload.thread)
         else:
-            color = WriteOut(fmt=fmt, coord_width=config.coord_width, **widths)
+            color = WriteOut(fmt=fmt, coord_width=config.coord_width, may_be_none=config.edge_tolerance > 0,
+                             **widths)
             m.submodules.write_out = color
             wiring.connect(m, color.color_request, wiring.flipped(self.shading_request))
             wiring.connect(m, wiring.flipped(self.shading_data), color.color_data)

@@ -1,5 +1,7 @@
 """Intersection of rays with the unit triangle, and the closest hit of each ray."""
 
+import math
+
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
@@ -33,9 +35,11 @@ def limits_layout(*, fmt, index_width):
 class Intersection(wiring.Component):
     """Tests a ray against the unit triangle each clock, and keeps each ray's closest hit.
 
-    A hit at the same distance as an earlier one does not replace it. With a tolerance it is not distances that are
-    compared and kept for the stack, but keys, see :func:`~rtl.unit_triangle.unit_triangle`. A ray for which any hit
-    will do has its distance set to 0 by a solid triangle, so that nothing is nearer from then on.
+    A hit at the same distance as an earlier one does not replace it. A ray for which any hit will do has its distance
+    set to 0 by a solid triangle, so that nothing is nearer from then on. With a tolerance it is keys that are compared
+    and kept for the stack, and beside each ray's the soft hit that waits for another, see
+    :func:`~rtl.unit_triangle.unit_triangle`; while a ray has no more than that, its record is that of a hit of triangle
+    number all ones, its key ∞.
 
     Parameters
     ----------
@@ -129,6 +133,9 @@ class Intersection(wiring.Component):
                                            "index": self._index_width, "cosine": self._fmt,
                                            "solid": int(self._limited)})
         ask_at = graph.inputs["t_hit"].start - 2
+        # Of each ray, what the next hit has to be nearer than.
+        best_layout = data.StructLayout({"key": self._fmt, "soft": self._fmt, "is_back": 1}) if self._tolerance else \
+            self._fmt
         m.submodules.to_ask = to_ask = Delay(beside_layout, cycles=ask_at)
         m.submodules.to_end = to_end = Delay(beside_layout, cycles=latency - ask_at, registered=True)
         valid = Signal(latency + 1)
@@ -144,26 +151,29 @@ class Intersection(wiring.Component):
             valid[0].eq(taken),
         ]
         m.d.sync += valid[1:].eq(valid[:-1])
-        m.submodules.distances = distances = BlockMemory(self._fmt, depth=PACKET_RAYS * num_slots)
+        m.submodules.distances = distances = BlockMemory(best_layout, depth=PACKET_RAYS * num_slots)
+        best = self._best(m, test, distances.data, to_ask.o) if self._tolerance else distances.data
         m.d.comb += [
             distances.reading.eq(valid[ask_at]),
             distances.address.eq(Cat(to_ask.o.ray, to_ask.o.token.thread)),
-            test.t_hit.eq(distances.data),
+            test.t_hit.eq(best.key if self._tolerance else best),
         ]
 
         found = Signal(data.StructLayout({"hit": 1, "nearer": 1, "t": self._fmt, "u": self._fmt, "v": self._fmt,
-                                          **({"key": self._fmt} if self._tolerance else {})}), reset_less=True)
+                                          **({"key": self._fmt, "is_soft": 1} if self._tolerance else {})}),
+                       reset_less=True)
         m.d.sync += [found[name].eq(getattr(test, name)) for name in found.shape().members]
         done = to_end.o
         before = Signal(PACKET_RAYS)
         now = Signal(PACKET_RAYS)
         hits_so_far = Signal(PACKET_RAYS, reset_less=True)
         better = Signal()
+        kept = Signal() if self._tolerance else better
         allowed, is_over = Signal(init=1), Signal()
         m.d.comb += [
             better.eq(valid[-1] & found.hit & allowed & (found.nearer | ~done.token.hit.bit_select(done.ray, 1))),
             before.eq(Mux(done.first, done.token.hit, hits_so_far)),
-            now.eq(before | (better << done.ray)),
+            now.eq(before | (kept << done.ray)),
             self.tested.payload.eq(done.token),
             self.tested.payload.hit.eq(now),
             self.tested.valid.eq(valid[-1] & done.last),
@@ -176,12 +186,10 @@ class Intersection(wiring.Component):
         # What is written to the distances: a hit's, or the one that a ray begins with. A record has its t.
         new = Signal(data.StructLayout({"valid": 1, "thread": done.token.thread.shape(), "ray": range(PACKET_RAYS),
                                         "t": self._fmt}))
-        m.d.comb += [new.valid.eq(better), new.thread.eq(done.token.thread), new.ray.eq(done.ray),
-                     new.t.eq(Mux(is_over, self._fmt.const(0.0), found.key if self._tolerance else found.t))]
-        record_t = new.t
-        if self._tolerance:
-            record_t = Signal(self._fmt)
-            m.d.comb += record_t.eq(Mux(is_over, self._fmt.const(0.0), found.t))
+        m.d.comb += [new.valid.eq(kept), new.thread.eq(done.token.thread), new.ray.eq(done.ray),
+                     new.t.eq(Mux(is_over, self._fmt.const(0.0), found.t))]
+        new_best = Signal(best_layout) if self._tolerance else new.t
+        new_key = new_best.key if self._tolerance else new_best
         m.submodules.records = records = memory.Memory(shape=self._record, depth=PACKET_RAYS * num_slots, init=[])
         record_write = records.write_port()
         m.d.comb += [
@@ -191,9 +199,9 @@ class Intersection(wiring.Component):
             instance_read.addr.eq(done.token.thread),
             distances.write.valid.eq(new.valid),
             distances.write.address.eq(Cat(new.ray, new.thread)),
-            distances.write.data.eq(new.t),
+            distances.write.data.eq(new_best),
             record_write.addr.eq(Cat(new.ray, new.thread)),
-            record_write.data.t.eq(record_t),
+            record_write.data.t.eq(new.t),
             record_write.data.u.eq(found.u),
             record_write.data.v.eq(found.v),
             record_write.data.cosine.eq(done.cosine),
@@ -215,24 +223,60 @@ class Intersection(wiring.Component):
             bank_distance = Signal(self._fmt, name=f"distance{ray}", reset_less=True)
             m.d.comb += [
                 bank_write.addr.eq(new.thread),
-                bank_write.data.eq(new.t),
+                bank_write.data.eq(new_key),
                 bank_write.en.eq(new.valid & (new.ray == ray)),
                 bank_read.addr.eq(self.hit_address),
                 self.hit_distances[ray].eq(bank_distance),
             ]
             m.d.sync += bank_distance.eq(bank_read.data)
+        if self._tolerance:
+            self._keep_soft(m, best, new_best, record_write, found=found, done=done, better=better, kept=kept,
+                            taken=valid[-1] & allowed, is_over=is_over,
+                            cycles=latency - graph.inputs["t_hit"].start)
         if self._limited:
-            with m.If(~better):
+            with m.If(~kept):
                 m.d.comb += [new.valid.eq(self.limit.valid & self.limit.payload.has_far),
                              new.thread.eq(self.limit.payload.thread), new.ray.eq(self.limit.payload.ray),
                              new.t.eq(self.limit.payload.t_far),
                              record_write.data.triangle.eq(~0)]
                 if self._tolerance:
-                    m.d.comb += record_t.eq(self.limit.payload.t_far)
-            m.d.comb += self.limit.ready.eq(~better)
+                    m.d.comb += [new_best.key.eq(new.t), new_best.soft.eq(self._fmt.const(math.inf)),
+                                 record_write.en.eq(new.valid)]
+            m.d.comb += self.limit.ready.eq(~kept)
             self._limit(m, test, to_ask.o, to_end.o, cycles=latency - ask_at, instances=instances,
                         allowed=allowed, is_over=is_over)
         return m
+
+    def _best(self, m, test, stored, asking):
+        """What is stored of the ray ``asking``, two cycles later; of one without a hit it is another's."""
+        best = Signal(stored.shape())
+        m.submodules.asked_hit = has_hit = Delay(1, cycles=2)
+        infinity = self._fmt.const(math.inf)
+        m.d.comb += [
+            has_hit.i.eq(asking.token.hit.bit_select(asking.ray, 1)),
+            best.key.eq(Mux(has_hit.o, stored.key, infinity)),
+            best.soft.eq(Mux(has_hit.o, stored.soft, infinity)),
+            best.is_back.eq(stored.is_back),
+            test.t_soft.eq(best.soft),
+            test.is_back.eq(best.is_back),
+        ]
+        return best
+
+    def _keep_soft(self, m, best, new_best, record_write, *, found, done, better, kept, taken, is_over, cycles):
+        """Keeps a soft hit for another to join it, beside the best one that there is, ``cycles`` after that is read."""
+        m.submodules.best_until = until = Delay(best.shape(), cycles=cycles)
+        before, is_soft = until.o, Signal()
+        m.d.comb += [
+            until.i.eq(best),
+            is_soft.eq(taken & found.is_soft),
+            kept.eq(better | is_soft),
+            new_best.key.eq(Mux(better, Mux(is_over, self._fmt.const(0.0), found.key), before.key)),
+            new_best.soft.eq(Mux(is_soft, found.t, before.soft)),
+            new_best.is_back.eq(Mux(is_soft, done.cosine.sign, before.is_back)),
+        ]
+        with m.If(~better):
+            m.d.comb += [record_write.data.triangle.eq(~0),
+                         record_write.en.eq(is_soft & ~done.token.hit.bit_select(done.ray, 1))]
 
     def _scale(self, m, test, vector):
         """How much rounding may have changed origin and direction goes beside them."""

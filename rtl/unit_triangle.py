@@ -7,7 +7,7 @@ from .arithmetic import ARITHMETICS
 __all__ = ["MARGIN", "MAX_TOLERANCE", "edge_errors", "edge_scales", "inside_edges", "unit_triangle"]
 
 #: No edge gives by more, in u and v: seen so exactly from its edge that t is lost, a triangle would reach out.
-MAX_TOLERANCE = 2.0**-6
+MAX_TOLERANCE = 2.0**-4
 #: Tolerances by which a hit that is inside by tolerance alone counts as farther than it is.
 MARGIN = 4
 
@@ -26,17 +26,20 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
     added up. What rounding them does to O′x is the first term; the second is what t does, which divides by D′z = D·N
     and loses what that has lost, where a ray grazes. What is 0 or more is inside whatever ε is.
 
-    Where triangles overlap by their tolerance, the one that is hit without it is the one that is there. So what counts
-    is not t but ``key``: t, and for a hit by tolerance alone a ``margin`` more, see :meth:`~fpu.graph.Graph.raised`.
-    ``nearer`` is key < t_hit then, the nearest key so far, which depends on no order.
+    A hit by tolerance alone is soft, others are firm. Where a ray slips between two triangles, it is soft on both;
+    where it passes an outline, on one, or on two of which one is seen from behind. So a soft hit is a ``hit`` if it is
+    within a ``margin`` of t_soft, the nearest soft one that was none, on a triangle seen from the same side
+    (``is_back``: against its normal); else ``is_soft`` says if it is to be that one. And where triangles overlap by
+    their tolerance, the one that is hit firmly is the one that is there: what counts is not t but ``key``, t and of a
+    soft hit the margin more, see :meth:`~fpu.graph.Graph.raised`. ``nearer`` is key < t_hit then, the nearest so far.
 
-    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator; if tolerant, a few
-    additions and comparisons of exponents, and an addition of a constant to bits.
+    Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator; if tolerant, two more,
+    a few additions and comparisons of exponents, and additions of a constant to bits.
     """
     dp = Datapath(fmt, latencies=latencies, **arithmetic.parameters)
     origin, direction = dp.vector("origin"), dp.vector("direction")
     t = dp.neg(dp.div(origin.z, direction.z))
-    key = t
+    key, soft = t, None
     u = dp.add(origin.x, dp.mul(t, direction.x))
     v = dp.add(origin.y, dp.mul(t, direction.y))
     if tolerant:
@@ -44,12 +47,23 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
         # A constant that needs no registers
         tolerance = dp.input("tolerance", delay=max(map(dp.arrival, errors)))
         inside = inside_edges(dp, u, v, [dp.power_mul(error, tolerance) for error in errors])
-        key = dp.select(_is_inside(dp, u, v), t, dp.raised(t, dp.input("margin", delay=dp.arrival(t))))
+        firm, later = _is_inside(dp, u, v), dp.raised(t, margin := dp.input("margin", delay=dp.arrival(t)))
+        key = dp.select(firm, t, later)
+        t_soft, is_back = (declare(name, delay=dp.arrival(key))
+                           for declare, name in ((dp.input, "t_soft"), (dp.flag, "is_back")))
+        goes_back = dp.sign(direction.z)
+        is_first = dp.gt(t_soft, later)
+        is_pair = dp.logical_and(
+            dp.logical_not(is_first), dp.le(t, dp.raised(t_soft, margin)),
+            dp.logical_or(dp.logical_and(goes_back, is_back),
+                          dp.logical_not(dp.logical_or(goes_back, is_back))))
+        soft = dp.logical_and(inside, dp.logical_not(firm), is_first)
+        inside = dp.logical_and(inside, dp.logical_or(firm, is_pair))
     else:
         inside = _is_inside(dp, u, v)
     t_hit = dp.input("t_hit", delay=dp.arrival(key))
     if near:
-        ahead = dp.logical_and(dp.is_finite(t), dp.lt(dp.input("t_near", delay=dp.arrival(t)), t))
+        ahead = dp.logical_and(dp.is_finite(t), dp.lt(dp.input("t_near", delay=dp.arrival(key)), t))
     else:
         ahead = dp.logical_and(dp.is_finite(t), dp.logical_not(dp.sign(t)), dp.logical_not(dp.is_zero(t)))
     dp.output("t", t)
@@ -59,6 +73,7 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
     dp.output("nearer", dp.lt(key, t_hit))
     if tolerant:
         dp.output("key", key)
+        dp.output("is_soft", dp.logical_and(ahead, soft))
     return dp
 
 

@@ -38,6 +38,9 @@ class WriteOut(wiring.Component):
     num_threads, stack_depth, index_width, coord_width : int
         See :class:`~rtl.config.ChipConfig`.
 
+    may_be_none : bool
+        A record of triangle number all ones is that of no hit.
+
     Members
     -------
     width, height : size of the picture; what lies outside is not written
@@ -55,8 +58,9 @@ class WriteOut(wiring.Component):
     #: Colours that can be on their way.
     num_requests = 16
 
-    def __init__(self, *, fmt, num_threads, stack_depth, index_width, coord_width):
+    def __init__(self, *, fmt, num_threads, stack_depth, index_width, coord_width, may_be_none=False):
         self._fmt = fmt
+        self._may_be_none = may_be_none
         self._token = token = token_layout(num_threads=num_threads, stack_depth=stack_depth)
         self._record = hit_layout(fmt=fmt, index_width=index_width)
         self._coord_width = coord_width
@@ -132,16 +136,20 @@ class WriteOut(wiring.Component):
         ]
         m.d.sync += valid[1:].eq(valid[:-1])
         is_inside = Signal()
+        is_hit = place.o.is_hit
+        if self._may_be_none:
+            is_hit = Signal()
+            m.d.comb += is_hit.eq(place.o.is_hit & ~hit.o.triangle.all())
         m.d.comb += [
             is_inside.eq((place.o.x < self.width) & (place.o.y < self.height)),
             outside.eq(valid[-1] & ~is_inside),
             pending.i.valid.eq(valid[-1] & is_inside),
             pending.i.payload.pixel.x.eq(place.o.x),
             pending.i.payload.pixel.y.eq(place.o.y),
-            pending.i.payload.pixel.is_hit.eq(place.o.is_hit),
+            pending.i.payload.pixel.is_hit.eq(is_hit),
             pending.i.payload.pixel.hit.eq(hit.o),
             pending.i.payload.intensity.eq(Mux(bright.o, 1 << INTENSITY_BITS, convert.r)),
-            wanted.i.valid.eq(pending.i.valid & place.o.is_hit),
+            wanted.i.valid.eq(pending.i.valid & is_hit),
             wanted.i.payload.eq(hit.o.triangle),
             colors.i.valid.eq(self.color_data.valid),
             colors.i.payload.eq(self.color_data.payload),

@@ -1,6 +1,7 @@
 """The closest hit of each ray by a method, tested against all triangles whose widened boxes it meets."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numba
 import numpy as np
@@ -115,6 +116,18 @@ def near_pairs(corners, origins, directions, *, pad):
     return Pairs(starts, found)
 
 
+def _joined(fmt, ray, tested, margin):
+    """Soft hits that another before them, within the margin on the same side, makes hits; as if tested by distance."""
+    joined = np.zeros(len(ray), np.bool_)
+    soft = np.flatnonzero(tested.is_soft)
+    order = soft[np.lexsort((tested.t[soft], tested.is_back[soft], ray[soft]))]
+    one, other = order[:-1], order[1:]
+    bits = fmt.encode(tested.t[order])
+    joined[other] = ((ray[one] == ray[other]) & (tested.is_back[one] == tested.is_back[other])
+                     & (bits[1:] - bits[:-1] <= margin))
+    return joined
+
+
 def closest_hits(method, fmt, corners, origins, directions, pairs, *, excluded=None):
     """The nearest hit of each ray, of equally near ones any.
 
@@ -138,14 +151,17 @@ def closest_hits(method, fmt, corners, origins, directions, pairs, *, excluded=N
     t, triangle = np.full(len(origins), np.inf), np.full(len(origins), -1)
     nearest, is_odd = np.full(len(origins), np.inf), np.zeros(len(origins), np.bool_)
     ray_of = pairs.ray
-    for start in range(0, len(ray_of), _BATCH):
-        ray, of = ray_of[start:start + _BATCH], pairs.triangle[start:start + _BATCH]
+    # All of a ray's pairs go together.
+    starts = np.unique(pairs.first[np.searchsorted(pairs.first, np.arange(0, len(ray_of), _BATCH))])
+    for start, end in pairwise([*starts, len(ray_of)]):
+        ray, of = ray_of[start:end], pairs.triangle[start:end]
         keeps = usable[of] if excluded is None else usable[of] & (excluded[ray] != of)
         ray, of = ray[keeps], of[keeps]
-        t_pair, u, v, hit, key = method.test(fmt, {name: value[of] for name, value in stored.items()},
-                                             {name: value[ray] for name, value in rays.items()})
-        is_odd[ray[np.isnan(t_pair) | np.isnan(u) | np.isnan(v)]] = True
-        ray, of, t_pair, key = ray[hit], of[hit], t_pair[hit], key[hit]
+        tested = method.test(fmt, {name: value[of] for name, value in stored.items()},
+                             {name: value[ray] for name, value in rays.items()})
+        is_odd[ray[np.isnan(tested.t) | np.isnan(tested.u) | np.isnan(tested.v)]] = True
+        hit = tested.hit | _joined(fmt, ray, tested, method.margin)
+        ray, of, t_pair, key = ray[hit], of[hit], tested.t[hit], tested.key[hit]
         # The nearest of each ray comes last, so that it is what stays.
         order = np.lexsort((-key, ray))
         order = order[np.append(ray[order][1:] != ray[order][:-1], True)[:len(ray)]]

@@ -1,6 +1,6 @@
 """Ray/triangle tests as datapaths: what they store of a triangle, what they compute once for a ray, and the test."""
 
-from collections import Counter
+from collections import Counter, namedtuple
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -8,7 +8,10 @@ import numpy as np
 
 from .parts import named
 
-__all__ = ["Method", "built"]
+__all__ = ["Method", "Tested", "built"]
+
+#: Results of a test, of which not all have the last three: else the key is t, and nothing soft.
+Tested = namedtuple("Tested", ["t", "u", "v", "hit", "key", "is_soft", "is_back"])
 
 
 @lru_cache(maxsize=64)
@@ -35,6 +38,8 @@ class Method:
         ``result_x`` … as its ``origin`` and ``direction``, and what else it gives under ``origin_…``, ``direction_…``.
     constants : callable
         ``constants(fmt)``: inputs of the test by name that are always the same.
+    margin : int
+        Units in the last place within which two soft hits make one, see :func:`~rtl.unit_triangle.unit_triangle`.
     needs_area : bool
         Triangles without area cannot be stored, and are left out.
     """
@@ -45,6 +50,7 @@ class Method:
     per_ray: object = None
     point_map: object = None
     constants: object = lambda fmt: {}
+    margin: int = 0
     needs_area: bool = False
 
     def store(self, fmt, corners):
@@ -77,7 +83,7 @@ class Method:
         return rays | built(self.per_ray, fmt).model(**named("direction", directions))
 
     def test(self, fmt, triangles, rays):
-        """(t, u, v, hit, key) of a ray and a triangle in each place of arrays of :meth:`begin` and :meth:`store`."""
+        """:data:`Tested` of a ray and a triangle in each place of the arrays of :meth:`begin` and :meth:`store`."""
         if self.point_map is not None:
             mapped = built(self.point_map, fmt)
             moved = {}
@@ -89,7 +95,9 @@ class Method:
         test = built(self.datapath, fmt)
         given = {"t_hit": np.inf, **self.constants(fmt), **triangles, **rays}
         results = test.model(**{name: given[name] for name in test.input_names})
-        return *(results[name] for name in ("t", "u", "v", "hit")), results.get("key", results["t"])
+        nothing = np.zeros(np.shape(results["hit"]), np.bool_)
+        return Tested(*(results[name] for name in ("t", "u", "v", "hit")), results.get("key", results["t"]),
+                      results.get("is_soft", nothing), np.signbit(given["direction_z"]) if self.margin else nothing)
 
     def cost(self, fmt):
         """Operators for a test a clock, as :meth:`~fpu.Datapath.cost`; those that a ray takes once are apart."""

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from fpu import Datapath
 from rtl.affine_map import affine_map
 from rtl.config import ChipConfig
@@ -84,9 +86,12 @@ def tolerant(ulp, *, bound=None, cap=MAX_TOLERANCE, name=None):
     if bound not in (None, *BOUNDS):
         raise ValueError(f"Bound must be one of {', '.join(BOUNDS)}, not {bound!r}")
     if bound is None:
+        def constants(fmt):
+            unit = 2.0**-fmt.frac_width
+            return {"tolerance": ulp * unit, "margin": MARGIN * ulp * unit, "t_soft": np.inf, "is_back": False}
+
         return Method(name or f"tolerant {ulp}", stored_matrix, _chip_test, point_map=scaled_map, needs_area=True,
-                      constants=lambda fmt: {"tolerance": ulp * 2.0**-fmt.frac_width,
-                                             "margin": MARGIN * ulp * 2.0**-fmt.frac_width})
+                      margin=MARGIN * ulp, constants=constants)
 
     def test(fmt):
         return tolerant_test(fmt, ulp=ulp, bound=bound, cap=cap)

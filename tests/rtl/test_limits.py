@@ -9,6 +9,7 @@ import pytest
 from fpu import FloatFormat
 from rtl.intersection import Intersection
 from rtl.layout import PACKET_RAYS
+from rtl.unit_triangle import MARGIN, MAX_TOLERANCE
 from tests.bench import drain, feed, simulate
 from tests.rtl.packets import fields, random_token, rays_of
 from tests.rtl.rounded import Rounded, same
@@ -25,14 +26,17 @@ NUM_TRIANGLES = 3
 class World:
     """Rays with limits, the packets in triangles' spaces that they are tested in, and what they are to have hit."""
 
-    def __init__(self, *, seed, num_threads, num_packets, near):
+    def __init__(self, *, seed, num_threads, num_packets, near, tolerance=0):
         self.near = near
+        self.tolerance = tolerance
         self.rng = random.Random(seed)
         self.arithmetic = Rounded(FMT)
         self.num_packets = num_packets
         self.limits, self.vectors, self.entered = deque(), deque(), deque()
         # Of each thread: limits by ray, records by ray, tests that are still to come, and its instance.
         self.rays, self.records = {}, {thread: {} for thread in range(num_threads)}
+        # Of each thread and ray, the soft hit that waits for another: t, and whether from behind.
+        self.soft = {}
         self.left = dict.fromkeys(range(num_threads), 0)
         self.instances, self.expected = {}, {}
         self.events = Counter()
@@ -42,7 +46,7 @@ class World:
         rng = self.rng
         self.num_packets -= 1
         self.left[thread] = rng.randrange(3, 7)
-        self.rays[thread], self.records[thread] = {}, {}
+        self.rays[thread], self.records[thread], self.soft[thread] = {}, {}, {}
         for ray in rng.sample(range(PACKET_RAYS), rng.randrange(1, PACKET_RAYS + 1)):
             limits = {"t_near": rng.choice([0.0, 0.0, 0.5, 1.0, 1.5]),
                       "triangle": rng.choice([*range(NUM_TRIANGLES), NONE]),
@@ -51,7 +55,7 @@ class World:
             self.limits.append({"thread": thread, "ray": ray, "has_far": has_far, "t_far": t_far, "limits": limits})
             self.rays[thread][ray] = limits
             if has_far:
-                self.records[thread][ray] = {"t": t_far, "triangle": NONE}
+                self.records[thread][ray] = {"t": t_far, "key": t_far, "triangle": NONE}
 
     def test(self, thread):
         """The packet in one triangle's space, some of its rays anyway."""
@@ -65,52 +69,87 @@ class World:
         instance = self.instances[thread] if token["level"] else NONE
         packet = {"token": token, "index": index, "solid": solid}
         numbers = rays_of(mask)
-        origin = None
+        origin = scale = None
         for ray in numbers:
             if origin is None or own:
+                scales = [rng.choice([0, FMT.bias - 1, FMT.bias, FMT.bias + 1]) for _ in range(3)]
+                scale = {"scale": scales} if self.tolerance else {}
                 origin = [rng.randrange(-4, 9) / 4 for _ in range(2)] + [rng.choice([-1, 1]) * rng.randrange(1, 16) / 4]
                 self.vectors.append(packet | {"is_origin": 1, "ray": ray, "first": int(ray == numbers[0]), "last": 0,
-                                              "vector": dict(zip("xyz", origin, strict=True))})
+                                              **scale, "vector": dict(zip("xyz", origin, strict=True))})
             target = rng.randrange(4) / 4, rng.randrange(3) / 4, 0.0
+            if self.tolerance and rng.random() < 0.7:
+                target = rng.choice([0.25, 0.5]), rng.choice([-1, -4, -12, -100]) / 256, 0.0
             # t is how often this fits in, often one of the limits.
-            scale = rng.choice([1.0, 1.0, 2.0, 4 / 3, 0.5, 0.25, -1.0])
-            direction = [self.arithmetic.round(scale * (end - begin))
+            times = rng.choice([1.0, 1.0, 2.0, 4 / 3, 0.5, 0.25, -1.0])
+            direction = [self.arithmetic.round(times * (end - begin))
                          for end, begin in zip(target, origin, strict=True)]
             self.vectors.append(packet | {"is_origin": 0, "ray": ray, "first": int(ray == numbers[0]),
                                           "last": int(ray == numbers[-1]),
+                                          **({"scale": [0, 0, 0]} if self.tolerance else {}),
                                           "vector": dict(zip("xyz", direction, strict=True))})
-            self.keep(thread, ray, index, instance, solid, origin, direction, token["level"])
+            self.keep(thread, ray, index, instance, solid, origin, direction, token["level"], scales)
         self.expected[thread] = token | {"hit": sum(1 << ray for ray in records)}
 
-    def keep(self, thread, ray, index, instance, solid, origin, direction, level):
+    def raised(self, t):
+        """So many units in the last place farther."""
+        return float(FMT.decode(FMT.encode(t) + MARGIN * self.tolerance)) if 0 < t < math.inf else t
+
+    def join(self, thread, ray, t, direction):
+        """Whether a soft hit finds one that waits for it; else it may wait itself."""
+        is_back = math.copysign(1, direction[2]) < 0
+        waiting, from_behind = self.soft[thread].get(ray, (math.inf, False))
+        if waiting <= self.raised(t):
+            self.events["of another side" if is_back != from_behind else "joined" if t <= self.raised(waiting) else
+                        "alone and behind"] += 1
+            return is_back == from_behind and t <= self.raised(waiting)
+        self.events["waits"] += 1
+        self.soft[thread][ray] = t, is_back
+        if ray not in self.records[thread]:
+            self.records[thread][ray] = {"key": math.inf, "triangle": NONE}
+        return False
+
+    def keep(self, thread, ray, index, instance, solid, origin, direction, level, scales):
         limits, records, events = self.rays[thread][ray], self.records[thread], self.events
         t, u, v, _ = reference_test(self.arithmetic, origin, direction)
-        kept = records.get(ray, {}).get("t", math.inf)
-        if not (u >= 0 and v >= 0 and self.arithmetic.add(u, v) <= 1 and t < math.inf):
+        kept, total = records.get(ray, {}).get("key", math.inf), self.arithmetic.add(u, v)
+        edges = [min(self.tolerance * 2.0 ** (scale - FMT.bias - FMT.frac_width), MAX_TOLERANCE) if scale else 0.0
+                 for scale in scales[:2]]
+        is_firm = u >= 0 and v >= 0 and total <= 1
+        is_soft = not is_firm and self.tolerance and all(
+            x >= 0 or -x < edge for x, edge in zip((u, v), edges, strict=True)) and (
+            total <= 1 or total < 1 + max(edges))
+        key = self.raised(t) if is_soft else t
+        if not ((is_firm or is_soft) and t < math.inf):
             events["beside"] += 1
         elif not (limits["t_near"] if self.near else 0) < t:
             events["too near" if t > 0 else "behind"] += 1
             events["just too near"] += t == limits["t_near"] > 0
         elif (index, instance) == (limits["triangle"], limits["instance"]):
             events["excluded inside of an instance" if level else "excluded"] += 1
-        elif not t < kept:
-            events["over" if kept == 0 else "as far" if t == kept else "too far"] += 1
+        elif is_soft and not self.join(thread, ray, t, direction):
+            pass
+        elif not key < kept:
+            events["over" if kept == 0 else "as far" if key == kept else "too far"] += 1
             events["beyond t_far"] += records[ray]["triangle"] == NONE
         else:
             over = solid and limits["any_hit"]
             events["is over" if over else "passes through" if limits["any_hit"] else "closest"] += 1
             events["excluded but for its instance"] += index == limits["triangle"]
-            records[ray] = {"t": 0.0 if over else t, "u": u, "v": v, "cosine": direction[2], "triangle": index,
-                            "in_instance": level, "instance": instance if level else None}
+            records[ray] = {"t": 0.0 if over else t, "key": 0.0 if over else key, "u": u, "v": v,
+                            "cosine": direction[2], "triangle": index, "in_instance": level,
+                            "instance": instance if level else None}
 
 
-@pytest.mark.parametrize(("seed", "num_threads", "gap", "near"), [
-    (0, 1, 0.0, True), (1, 6, 0.3, True), (2, 12, 0.0, True), (3, 8, 0.0, False)])
-def test_limits(seed, num_threads, gap, near):
-    world = World(seed=seed, num_threads=num_threads, num_packets=90, near=near)
+@pytest.mark.parametrize(("seed", "num_threads", "gap", "near", "tolerance"), [
+    (0, 1, 0.0, True, 0), (1, 6, 0.3, True, 0), (2, 12, 0.0, True, 0), (3, 8, 0.0, False, 0), (4, 8, 0.2, True, 4),
+    (5, 1, 0.0, False, 4)])
+def test_limits(seed, num_threads, gap, near, tolerance):
+    world = World(seed=seed, num_threads=num_threads, num_packets=180 if tolerance else 90, near=near,
+                  tolerance=tolerance)
     rng = world.rng
     dut = Intersection(fmt=FMT, num_threads=num_threads, stack_depth=STACK_DEPTH, index_width=INDEX_WIDTH,
-                       latencies=LATENCIES, limited=True, near=near, num_readers=2)
+                       latencies=LATENCIES, limited=True, near=near, num_readers=2, tolerance=tolerance)
     tested = deque()
     accepted = Counter()
     idle, beginning = set(range(num_threads)), set()
@@ -152,9 +191,9 @@ def test_limits(seed, num_threads, gap, near):
                 ctx.set(dut.record_address[reader], {"thread": thread, "ray": ray})
                 await ctx.tick().repeat(2)
                 got = ctx.get(dut.record[reader])
-                assert same(ctx.get(dut.hit_distances[ray]), record["t"])
+                assert same(ctx.get(dut.hit_distances[ray]), record["key"])
                 for name, expected in record.items():
-                    if expected is not None:
+                    if expected is not None and name != "key":
                         assert same(float(got[name]), float(expected)), name
                 num_records[0] += 1
             del world.expected[thread]
@@ -171,6 +210,8 @@ def test_limits(seed, num_threads, gap, near):
         assert events[event] > 2 or "near" in event, event
     assert min(events["too near"], events["just too near"]) > 2 if near else not events["too near"]
     assert num_records[0] > 200
+    if tolerance:
+        assert min(events[event] for event in ("of another side", "joined", "alone and behind", "waits")) > 2
 
 
 def log_accepted(dut, accepted):

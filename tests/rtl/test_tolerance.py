@@ -19,6 +19,12 @@ def power(value):
     return 2.0 ** math.floor(math.log2(abs(value))) if value else 0.0
 
 
+def raised(t, units):
+    """So many units in the last place farther from 0."""
+    bits = FMT.encode(abs(t)) + (units if 0 < abs(t) < np.inf else 0)
+    return math.copysign(FMT.decode(np.minimum(bits, FMT.exp_inf << FMT.frac_width)), t)
+
+
 def random(rng, shape, spread=6):
     return FMT.quantize(rng.normal(size=shape) * 2.0 ** rng.integers(-spread, spread, shape))
 
@@ -65,8 +71,11 @@ def test_edges_give_by_what_was_lost(ulp):
     tolerant = inputs | {f"{name}_scale_{axis}": values[:, k] for name, values in scales.items()
                          for k, axis in enumerate("xyz")} | {"tolerance": np.full(COUNT, tolerance),
                                                            "margin": np.full(COUNT, MARGIN * tolerance)}
+    # One that waits is near as often as not.
+    t_soft = FMT.quantize(np.abs(t) * (1 + rng.choice([-9, -3, 0, 3, 9], COUNT) * ulp * 2.0**-16))
+    tolerant |= {"t_soft": np.where(rng.random(COUNT) < 0.3, np.inf, t_soft), "is_back": rng.random(COUNT) < 0.5}
     plain, found = unit_triangle(FMT).model(**inputs), unit_triangle(FMT, tolerant=True).model(**tolerant)
-    hits = beaten = 0
+    hits = beaten = waits = 0
     for i in range(COUNT):
         u, v, t = (float(plain[name][i]) for name in ("u", "v", "t"))
         assert (u, v, t) == tuple(float(found[name][i]) for name in ("u", "v", "t"))
@@ -76,13 +85,16 @@ def test_edges_give_by_what_was_lost(ulp):
         inside = all(x >= 0 or abs(x) < limit for x, limit in zip((u, v), limits, strict=True))
         total = float(FMT.quantize(u + v))
         inside &= total <= 1 or total < 1 + max(limits)
-        assert bool(found["hit"][i]) == (inside and 0 < t < np.inf)
+        is_firm, ahead = u >= 0 and v >= 0 and total <= 1, 0 < t < np.inf
+        waiting, later = float(tolerant["t_soft"][i]), raised(t, MARGIN * ulp)
+        same_side = bool(tolerant["is_back"][i]) == (math.copysign(1, direction[i, 2]) < 0)
+        pairs = waiting <= later and t <= raised(waiting, MARGIN * ulp) and same_side
+        assert bool(found["hit"][i]) == (inside and ahead and (is_firm or pairs))
+        assert bool(found["is_soft"][i]) == (inside and ahead and not is_firm and waiting > later)
+        waits += bool(found["is_soft"][i])
         hits += bool(found["hit"][i]) and not plain["hit"][i]
         # A hit by tolerance alone has to be nearer by the margin.
-        is_firm = u >= 0 and v >= 0 and total <= 1
-        units = 0 if is_firm else MARGIN * ulp
-        bits = FMT.encode(abs(t)) + (units if 0 < abs(t) < np.inf else 0)
-        key = math.copysign(FMT.decode(np.minimum(bits, FMT.exp_inf << FMT.frac_width)), t)
+        key = t if is_firm else later
         assert found["key"][i] == key
         assert bool(found["nearer"][i]) == (key < inputs["t_hit"][i])
         beaten += bool(found["nearer"][i]) != bool(plain["nearer"][i])
@@ -90,3 +102,4 @@ def test_edges_give_by_what_was_lost(ulp):
         assert found["hit"][i] or not plain["hit"][i]
     assert hits > COUNT / 200
     assert beaten > COUNT / 20
+    assert waits > COUNT / 200
