@@ -2,7 +2,6 @@
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import click
 from rich.console import Console
@@ -43,7 +42,8 @@ def _pictures(scenes, console):
         golden = render_golden(scene, camera, *SIZE)
         image = CompiledScene(scene, fmt=FORMAT).image(scene, eye=camera.eye)
         for number, arithmetic in enumerate(ARITHMETICS):
-            frame = render_model(image, camera, *SIZE, config=replace(ChipConfig(), fmt=FORMAT, arithmetic=number))
+            frame = render_model(image, camera, *SIZE, config=ChipConfig(
+                fmt=FORMAT, arithmetic=number, edge_tolerance=0))
             counts = frame.report["counts"]
             rows.append({"scene": name, "arithmetic": arithmetic.name,
                          "wrong_pixels": int(frame.differs_in_surface(golden).sum()),

@@ -72,7 +72,7 @@ def _known(path, values, kind, whose):
         if name not in types:
             raise BadInput(f"{path}: '{name}' is not a parameter of {whose}; there are {', '.join(sorted(types))}")
         expected = types[name]
-        if expected in (int, bool) and type(value) is not expected:
-            what = "a whole number" if expected is int else "true or false"
+        if expected in (int, bool, int | None) and type(value) is not (bool if expected is bool else int):
+            what = "true or false" if expected is bool else "a whole number"
             raise BadInput(f"{path}: {name} is {json.dumps(value)}; it must be {what}")
         yield name, value

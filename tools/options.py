@@ -104,10 +104,10 @@ def chip_config(fmt, parameters):
     files = [given for given in parameters if isinstance(given, Path)]
     if len(files) > 1:
         raise click.UsageError(f"--chip: {files[0]} and {files[1]} are two chips; name one file")
-    config = chip_of(files[0]) if files else ChipConfig()
+    changed = {**({"fmt": fmt} if fmt else {}), **dict(given for given in parameters if given not in files)}
+    config = chip_of(files[0]) if files else None
     try:
-        changed = dict(given for given in parameters if given not in files)
-        return replace(config, **({"fmt": fmt} if fmt else {}), **changed)
+        return ChipConfig(**changed) if config is None else replace(config, **changed)
     except ValueError as error:
         raise click.UsageError(f"--chip: {error}") from error
 

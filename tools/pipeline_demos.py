@@ -27,8 +27,8 @@ DEPTH = 4
 #: Scenes, the sizes of their pictures, and their cameras.
 DEMOS = (("room", (128, 96), 0), ("mirror-room", (128, 96), 0), ("mirror-room", (128, 96), 1), ("walk", (96, 72), 0),
          ("vpl", (32, 24), 0), ("sunflowers", (96, 72), 0))
-#: The chip of the demos.
-DEMO_CHIP = ChipConfig(fmt=FORMAT, num_shaders=2)
+#: The chip of the demos. A tolerance of edges would hide what a format does to them.
+DEMO_CHIP = ChipConfig(fmt=FORMAT, num_shaders=2, edge_tolerance=0)
 #: Memory latency of the demos: cycles to a line's first word, and up to so many more at random.
 LATENCY, JITTER = 4, 8
 #: Levels by which a pixel may differ before it is counted.

@@ -20,8 +20,8 @@ __all__ = ["effect_rows"]
 
 _SIZE, _JITTER, _COLUMNS = (80, 60), 20, 5
 #: Caches that fill up even here.
-_CHIP = ChipConfig(fmt=FORMAT, num_threads=16, shading_lines=16, texture_lines=32, node_lines=64, list_lines=32,
-                   matrix_lines=32)
+_CHIP = ChipConfig(fmt=FORMAT, edge_tolerance=0, num_threads=16, shading_lines=16, texture_lines=32, node_lines=64,
+                   list_lines=32, matrix_lines=32)
 _OPTIMISE = "DYNRT_OPTIMISE"
 
 

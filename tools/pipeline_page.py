@@ -21,8 +21,8 @@ def _demos(results):
         [[row["demo"], *(f"{point['psnr_db']:.1f}, {point['flip']:.4f}" for point in row["formats"])] for row in rows])
     enough = markdown_table(
         ["demo", "narrowest format that is enough", "PSNR", "FLIP", "cycles", "chip ≠ model"],
-        [[row["demo"], row["enough"]["format"], f"{row['enough']['psnr_db']} dB", row["enough"]["flip"],
-          f"{row['enough']['cycles']:,}", row["enough"]["rtl_wrong_pixels"]] for row in rows])
+        [[row["demo"], found["format"], f"{found['psnr_db']} dB", found["flip"], f"{found['cycles']:,}",
+          found["rtl_wrong_pixels"]] for row in rows for found in [row.get("enough")] if found])
     kinds = list(rows[0]["rays_by_kind"]) if rows else []
     by_kind = markdown_table(["demo", *kinds], [[row["demo"], *(f"{row['rays_by_kind'][kind]:,}" for kind in kinds)]
                                                 for row in rows])

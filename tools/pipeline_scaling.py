@@ -19,12 +19,8 @@ CACHES = ((128, 256), (2, 256), (128, 2), (2, 2), (32, 64), (512, 1024))
 _CACHES_DEMO, _CACHES_SIZE, _CACHES_LATENCY = "mirror-room", (128, 96), 20
 
 
-#: Cycles are counted, which a tolerance changes by next to nothing; without one, chips are compiled sooner.
-_CHIP = replace(DEMO_CHIP, edge_tolerance=0)
-
-
 def _lit(needs):
-    return replace(_CHIP, shader=replace(needs, depth=0))
+    return replace(DEMO_CHIP, shader=replace(needs, depth=0))
 
 
 def scaling_rows(console):
@@ -60,7 +56,7 @@ def cache_rows(console):
     camera = scene.default_camera()
     image, rows = prepared(scene, camera), []
     for shading, texture in CACHES:
-        config = replace(_CHIP, shader=replace(image.needs, depth=DEPTH), shading_lines=shading,
+        config = replace(DEMO_CHIP, shader=replace(image.needs, depth=DEPTH), shading_lines=shading,
                          texture_lines=texture)
         report = render_rtl(image, camera, *_CACHES_SIZE, config=config, latency=_CACHES_LATENCY).report
         rows.append({"shading_lines": shading, "texture_lines": texture, "latency": _CACHES_LATENCY,

@@ -71,7 +71,8 @@ def test_error_of_t(truth, monkeypatch):
 
 
 def test_the_model_itself(truth):
-    variants = {"separate": {}, "fused": {"arithmetic": 1}, "tolerant": {"edge_tolerance": 2}}
+    variants = {"separate": {"edge_tolerance": 0}, "fused": {"arithmetic": 1, "edge_tolerance": 0},
+                "tolerant": {"edge_tolerance": 2}}
     found = truth.measure(FloatFormat(8, 23), variants)
     for figures in found.values():
         assert (figures["wrong_percent"], figures["cracks"], figures["phantoms"]) == (0, 0, 0)
