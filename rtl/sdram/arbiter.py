@@ -1,0 +1,78 @@
+"""Which access goes to the controller next."""
+
+from amaranth.hdl import Assert, Cat, Module, Mux, Signal
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from .commands import access_layout
+from .controller import selected
+from .least_recent import LeastRecent
+
+__all__ = ["Arbiter"]
+
+
+class Arbiter(wiring.Component):
+    """Chooses every other cycle among the accesses for whose bank the controller has room.
+
+    The source served least recently goes first, so that nobody is passed over more than once by each other one in what
+    both could have had. Those that are urgent go before all others, but at most every second time.
+
+    Latency is 2 to 3 cycles; throughput an access in two cycles, as fast as single words can move.
+
+    Parameters
+    ----------
+    chip : :class:`~.timing.SdramChip`
+        For the layout of addresses.
+    tag_width : int
+        Bits of an access's tag.
+    num_sources : int
+        How many there are.
+
+    Members
+    -------
+    source : array of streams of accesses, which stay until they are taken
+    urgent : a bit for each source
+    room : from the controller
+    access : stream of accesses to the controller
+    """
+
+    def __init__(self, *, chip, tag_width, num_sources):
+        self._chip = chip
+        self._access = access_layout(chip, tag_width=tag_width)
+        self._num_sources = num_sources
+        super().__init__({
+            "source": In(stream.Signature(self._access)).array(num_sources),
+            "urgent": In(num_sources),
+            "room": In(1 << chip.bank_width),
+            "access": Out(stream.Signature(self._access)),
+        })
+
+    def elaborate(self, platform):
+        m = Module()
+        low, high = self._chip.column_width - 1, self._chip.column_width - 1 + self._chip.bank_width
+        m.submodules.turns = turns = LeastRecent(num_bidders=self._num_sources)
+        chooses, was_urgent, is_urgent = Signal(), Signal(), Signal()
+        able, bids = Signal(self._num_sources), Signal(self._num_sources)
+        m.d.comb += [
+            able.eq(Cat(source.valid & self.room.bit_select(source.payload.address[low:high], 1)
+                        for source in self.source)),
+            turns.bid.eq(bids),
+            turns.served.eq(Mux(chooses, turns.grant, 0)),
+        ]
+        m.d.sync += [chooses.eq(~chooses), self.access.valid.eq(0)]
+        with m.If(chooses):
+            m.d.sync += [
+                self.access.valid.eq(turns.grant.any()),
+                self.access.payload.eq(selected([(granted, source.payload.as_value()) for granted, source
+                                                 in zip(turns.grant, self.source, strict=True)])),
+                was_urgent.eq(is_urgent),
+            ]
+        with m.Else():
+            first = able & self.urgent
+            m.d.sync += [bids.eq(able), is_urgent.eq(0)]
+            with m.If(first.any() & ~was_urgent):
+                m.d.sync += [bids.eq(first), is_urgent.eq(1)]
+        m.d.comb += [source.ready.eq(chooses & granted)
+                     for granted, source in zip(turns.grant, self.source, strict=True)]
+        m.d.sync += Assert(~self.access.valid | self.access.ready, "a bank has less room than it said")
+        return m
