@@ -40,8 +40,8 @@ class Bank(wiring.Component):
 
     Members
     -------
-    access : stream of accesses, always ready
-    room : there is room for one access more than those that were given until the last cycle but one
+    access : stream of accesses
+    room : there is room for one access more than those that were taken until the last cycle but one
     second : this is the second cycle of a slot
     hold : no bids are to be made
     writing, column_allowed : whether the data lines are for writing now, and free for it
@@ -61,7 +61,7 @@ class Bank(wiring.Component):
         self._access = bank_access_layout(timing.chip, tag_width=tag_width)
         self._column = column_layout(timing.chip, tag_width=tag_width)
         super().__init__({
-            "access": In(stream.Signature(self._access, always_ready=True)),
+            "access": In(stream.Signature(self._access)),
             "room": Out(1, init=1),
             "second": In(1), "hold": In(1), "writing": In(1), "column_allowed": In(1),
             "column_bid": Out(1), "row_bid": Out(1), "closing": Out(1),
@@ -75,7 +75,7 @@ class Bank(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         timing = self._timing
-        m.submodules.queue = queue = Queue(self._access, depth=self._depth, always_ready=True)
+        m.submodules.queue = queue = Queue(self._access, depth=self._depth)
         wiring.connect(m, wiring.flipped(self.access), queue.i)
         # One may be on its way here.
         m.d.sync += self.room.eq(queue.level < self._depth - 1)

@@ -117,14 +117,14 @@ class Controller(wiring.Component):
         address = self.access.payload.address
         bank_number = address[low:high]
         m.d.comb += [self.room.eq(Cat(bank.room for bank in banks)),
-                     self.access.ready.eq(self.room.bit_select(bank_number, 1))]
+                     self.access.ready.eq(Cat(bank.access.ready for bank in banks).bit_select(bank_number, 1))]
         for number, bank in enumerate(banks):
             m.d.comb += [
                 *(getattr(bank.access.payload, name).eq(getattr(self.access.payload, name))
                   for name in ("write", "left", "place", "tag")),
                 bank.access.payload.row.eq(address[high:]),
                 bank.access.payload.column.eq(address[:low]),
-                bank.access.valid.eq(self.access.valid & self.access.ready & (bank_number == number)),
+                bank.access.valid.eq(self.access.valid & (bank_number == number)),
             ]
 
     def _choose(self, m, second, banks, upkeep):
