@@ -17,7 +17,8 @@ class Arbiter(wiring.Component):
     The source served least recently goes first, so that nobody is passed over more than once by each other one in what
     both could have had. Those that are urgent go before all others, but at most every second time.
 
-    Latency is 2 to 3 cycles; throughput an access in two cycles, as fast as single words can move.
+    Latency is 3 to 4 cycles; throughput an access in two cycles, as fast as single words can move, of which each source
+    has at most every other one.
 
     Parameters
     ----------
@@ -52,27 +53,24 @@ class Arbiter(wiring.Component):
         low, high = self._chip.column_width - 1, self._chip.column_width - 1 + self._chip.bank_width
         m.submodules.turns = turns = LeastRecent(num_bidders=self._num_sources)
         chooses, was_urgent, is_urgent = Signal(), Signal(), Signal()
-        able, bids = Signal(self._num_sources), Signal(self._num_sources)
+        able, bids, granted = (Signal(self._num_sources) for _ in range(3))
         m.d.comb += [
             able.eq(Cat(source.valid & self.room.bit_select(source.payload.address[low:high], 1)
                         for source in self.source)),
             turns.bid.eq(bids),
             turns.served.eq(Mux(chooses, turns.grant, 0)),
         ]
-        m.d.sync += [chooses.eq(~chooses), self.access.valid.eq(0)]
+        m.d.sync += [chooses.eq(~chooses), granted.eq(0), self.access.valid.eq(granted.any())]
         with m.If(chooses):
-            m.d.sync += [
-                self.access.valid.eq(turns.grant.any()),
-                self.access.payload.eq(selected([(granted, source.payload.as_value()) for granted, source
-                                                 in zip(turns.grant, self.source, strict=True)])),
-                was_urgent.eq(is_urgent),
-            ]
+            m.d.sync += [granted.eq(turns.grant), was_urgent.eq(is_urgent)]
         with m.Else():
-            first = able & self.urgent
-            m.d.sync += [bids.eq(able), is_urgent.eq(0)]
+            # Whose access is taken now shows its next one only later.
+            first = able & self.urgent & ~granted
+            m.d.sync += [bids.eq(able & ~granted), is_urgent.eq(0)]
             with m.If(first.any() & ~was_urgent):
                 m.d.sync += [bids.eq(first), is_urgent.eq(1)]
-        m.d.comb += [source.ready.eq(chooses & granted)
-                     for granted, source in zip(turns.grant, self.source, strict=True)]
+        m.d.sync += self.access.payload.eq(selected([(take, source.payload.as_value()) for take, source
+                                                     in zip(granted, self.source, strict=True)]))
+        m.d.comb += [source.ready.eq(take) for take, source in zip(granted, self.source, strict=True)]
         m.d.sync += Assert(~self.access.valid | self.access.ready, "a bank has less room than it said")
         return m

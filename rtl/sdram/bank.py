@@ -41,7 +41,7 @@ class Bank(wiring.Component):
     Members
     -------
     access : stream of accesses
-    room : there is room for one access more than those that were taken until the last cycle but one
+    room : there is room for three accesses more than those taken until the last cycle but one
     second : this is the second cycle of a slot
     hold : no bids are to be made
     writing, column_allowed : whether the data lines are for writing now, and free for it
@@ -55,7 +55,7 @@ class Bank(wiring.Component):
     idle : nothing is under way or waits
     """
 
-    def __init__(self, *, timing, tag_width, depth=4):
+    def __init__(self, *, timing, tag_width, depth=6):
         self._timing = timing
         self._depth = depth
         self._access = bank_access_layout(timing.chip, tag_width=tag_width)
@@ -77,8 +77,7 @@ class Bank(wiring.Component):
         timing = self._timing
         m.submodules.queue = queue = Queue(self._access, depth=self._depth)
         wiring.connect(m, wiring.flipped(self.access), queue.i)
-        # One may be on its way here.
-        m.d.sync += self.room.eq(queue.level < self._depth - 1)
+        m.d.sync += self.room.eq(queue.level < self._depth - 2)
 
         current, has_current = Signal(self._access, reset_less=True), Signal()
         opened = Signal()

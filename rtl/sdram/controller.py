@@ -58,8 +58,8 @@ class Controller(wiring.Component):
     Members
     -------
     access : stream of accesses, see :func:`~.commands.access_layout`
-    room : for each bank whether it has room for one access more than those taken until the last cycle but one; what
-        chooses among accesses offers one for a bank that has, at most every other cycle
+    room : for each bank whether it has room for three accesses more than those taken until the last cycle but one, so
+        that what chooses among accesses can do so a while before it offers one
     fetch : the tag of a word that is written now
     store : that word, in the next cycle
     answer : a word that was read
@@ -68,7 +68,7 @@ class Controller(wiring.Component):
     pins : to the chip, see :func:`~.commands.pins_signature`
     """
 
-    def __init__(self, *, timing, tag_width, depth=4, input_delay=0):
+    def __init__(self, *, timing, tag_width, depth=6, input_delay=0):
         self._timing = timing
         self._tag_width = tag_width
         self._depth = depth

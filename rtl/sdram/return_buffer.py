@@ -22,7 +22,7 @@ class ReturnBuffer(wiring.Component):
 
     A port has slots, of which it takes one for each line when it asks for its first piece. A line that is there, with
     all that the port has asked for before, leaves at a word a cycle, one line at a time: twice as fast as words come.
-    The first leaves 5 cycles after the last has come, if there is no other before.
+    The first leaves 6 cycles after the last has come, if there is no other before.
 
     Parameters
     ----------
@@ -76,19 +76,21 @@ class ReturnBuffer(wiring.Component):
         m.d.comb += self.idle.eq(~Cat(levels).any())
 
         m.submodules.turns = turns = LeastRecent(num_bidders=num_ports)
-        reading, started = Signal(), Signal()
+        reading, started, chosen = Signal(), Signal(), Signal(num_ports)
         left = Signal(PLACE_WIDTH)
         place, number, slot = Signal(PLACE_WIDTH), Signal(range(num_ports)), Signal(range(num_slots))
         m.d.comb += [
             ends.eq(reading & (left == 0)),
             # Whose line has just been started has not seen yet whether there is another one.
-            turns.bid.eq(Mux(reading & ~ends, 0, is_done & ~Mux(started, reader, 0))),
-            starts.eq(turns.grant),
-            turns.served.eq(turns.grant),
+            turns.bid.eq(is_done & ~chosen & ~Mux(started, reader, 0)),
+            turns.served.eq(starts),
+            starts.eq(Mux(reading & ~ends, 0, chosen)),
             storage.address.eq(Cat(place, slot if num_slots > 1 else Const(0, 0), number)),
             storage.reading.eq(reading),
         ]
         m.d.sync += [started.eq(starts.any()), place.eq(place + 1), left.eq(left - 1)]
+        with m.If(~chosen.any() | starts.any()):
+            m.d.sync += chosen.eq(turns.grant)
         with m.If(starts.any()):
             m.d.sync += [reading.eq(1), reader.eq(starts), place.eq(0)]
         with m.Elif(ends):
