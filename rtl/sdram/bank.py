@@ -55,7 +55,7 @@ class Bank(wiring.Component):
     idle : nothing is under way or waits
     """
 
-    def __init__(self, *, timing, tag_width, depth=6):
+    def __init__(self, *, timing, tag_width, depth=8):
         self._timing = timing
         self._depth = depth
         self._access = bank_access_layout(timing.chip, tag_width=tag_width)
@@ -83,7 +83,7 @@ class Bank(wiring.Component):
         opened = Signal()
         # The open row, if there is one, is the one that is worked at.
         fits = Signal()
-        m.d.comb += [self.row.eq(current.row), self.idle.eq(~has_current & ~queue.o.valid)]
+        m.d.comb += self.row.eq(current.row)
 
         activated, precharged, moved = Signal(), Signal(), Signal()
         m.d.comb += [
@@ -100,7 +100,12 @@ class Bank(wiring.Component):
             cycled = self._elapsed(m, "cycle", [(activated, timing.rc)])
             may_activate = may_activate & cycled
 
-        has_next, next_fits = Signal(), Signal()
+        # What comes next waits in a register, so that a late grant does no more than move registers.
+        following, has_following, fits_following = Signal(self._access, reset_less=True), Signal(), Signal()
+        candidate = Signal(self._access)
+        m.d.comb += [candidate.eq(Mux(has_following, following, queue.o.payload)),
+                     queue.o.ready.eq(~self.second & ~has_following),
+                     self.idle.eq(~has_current & ~has_following & ~queue.o.valid)]
         closeable = Signal()
         m.d.comb += closeable.eq(may_precharge & may_recover)
         with m.If(~self.second):
@@ -116,8 +121,9 @@ class Bank(wiring.Component):
                 *(getattr(self.column, name).eq(getattr(current, name))
                   for name in ("write", "column", "place", "tag")),
                 self.column.last.eq(current.left == 0),
-                has_next.eq(queue.o.valid),
-                next_fits.eq(queue.o.payload.row == current.row),
+                following.eq(candidate),
+                has_following.eq(has_following | queue.o.valid),
+                fits_following.eq(candidate.row == current.row),
             ]
 
         with m.If(activated):
@@ -127,9 +133,8 @@ class Bank(wiring.Component):
         with m.If(moved):
             m.d.sync += [current.column.eq(current.column + 1), current.place.eq(current.place + 1),
                          current.left.eq(current.left - 1)]
-        with m.If(self.second & has_next & (~has_current | self.column_granted & self.finishing)):
-            m.d.comb += queue.o.ready.eq(1)
-            m.d.sync += [current.eq(queue.o.payload), has_current.eq(1), fits.eq(next_fits)]
+        with m.If(self.second & has_following & (~has_current | self.column_granted & self.finishing)):
+            m.d.sync += [current.eq(following), has_current.eq(1), fits.eq(fits_following), has_following.eq(0)]
         with m.Elif(moved & self.finishing):
             m.d.sync += has_current.eq(0)
         m.d.sync += [

@@ -68,7 +68,7 @@ class Controller(wiring.Component):
     pins : to the chip, see :func:`~.commands.pins_signature`
     """
 
-    def __init__(self, *, timing, tag_width, depth=6, input_delay=0):
+    def __init__(self, *, timing, tag_width, depth=8, input_delay=0):
         self._timing = timing
         self._tag_width = tag_width
         self._depth = depth

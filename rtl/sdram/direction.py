@@ -27,7 +27,7 @@ class Direction(wiring.Component):
     allowed : no data of the other direction are in the way
     """
 
-    def __init__(self, *, timing, patience=24):
+    def __init__(self, *, timing, patience=12):
         self._timing = timing
         self._patience = patience
         super().__init__({"second": In(1), "has_read": In(1), "has_write": In(1), "writing": Out(1), "allowed": Out(1)})

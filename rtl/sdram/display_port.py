@@ -36,7 +36,7 @@ class DisplayPort(wiring.Component):
     word : stream of the frames' words
     """
 
-    def __init__(self, *, chip, depth=256):
+    def __init__(self, *, chip, depth=512):
         self._chip = chip
         self._depth = depth
         super().__init__({

@@ -15,6 +15,9 @@ from .write_port import SLOT_WIDTH, WritePort, write_layout
 
 __all__ = ["SdramMemory"]
 
+#: Bursts of a display that may be under way: it is not to wait for more of them than the others have lines.
+_DISPLAY_SLOTS = 8
+
 
 class SdramMemory(wiring.Component):
     """Ports for lines, for words to write and for a display, on one SDRAM; what is not asked for is not built.
@@ -77,13 +80,14 @@ class SdramMemory(wiring.Component):
         m = Module()
         chip = self._timing.chip
         lines = [words for words, _ in self._readers.values()] + [MAX_WORDS] * self._display
-        tag = tag_layout(num_ports=len(lines), num_slots=self._num_slots)
+        slots = [self._num_slots] * len(self._readers) + [_DISPLAY_SLOTS] * self._display
+        tag = tag_layout(num_ports=len(lines), num_slots=max(slots))
         tag_width = max(tag.size, SLOT_WIDTH)
         num_sources = len(lines) + bool(self._num_writers)
         m.submodules.controller = controller = Controller(timing=self._timing, tag_width=tag_width,
                                                           input_delay=self._input_delay)
         m.submodules.arbiter = arbiter = Arbiter(chip=chip, tag_width=tag_width, num_sources=num_sources)
-        m.submodules.returns = returns = ReturnBuffer(words=lines, num_slots=self._num_slots)
+        m.submodules.returns = returns = ReturnBuffer(words=lines, slots=slots)
         wiring.connect(m, arbiter.access, controller.access)
         wiring.connect(m, wiring.flipped(self.pins), controller.pins)
         m.d.comb += [arbiter.room.eq(controller.room), returns.answer.eq(controller.answer),
@@ -111,6 +115,7 @@ class SdramMemory(wiring.Component):
             m.d.comb += [
                 source.valid.eq(writes.request.valid),
                 writes.request.ready.eq(source.ready),
+                arbiter.urgent[-1].eq(writes.urgent),
                 source.payload.write.eq(1),
                 source.payload.address.eq(writes.request.payload.address),
                 source.payload.tag.eq(writes.request.payload.slot),

@@ -28,8 +28,8 @@ class ReturnBuffer(wiring.Component):
     ----------
     words : list of int
         Words of a line, for each port.
-    num_slots : int
-        Lines that each port may have asked for, a power of two.
+    slots : list of int
+        Lines that each port may have asked for, powers of two.
 
     Members
     -------
@@ -40,14 +40,14 @@ class ReturnBuffer(wiring.Component):
     idle : no line is waited for
     """
 
-    def __init__(self, *, words, num_slots):
+    def __init__(self, *, words, slots):
         self._words = words
-        self._num_slots = num_slots
-        self._tag = tag_layout(num_ports=len(words), num_slots=num_slots)
+        self._slots = slots
+        self._tag = tag_layout(num_ports=len(words), num_slots=max(slots))
         asked = data.StructLayout({"valid": 1, "second": 1, "split": 1})
         super().__init__({
             "has_slot": Out(1).array(len(words)),
-            "slot": Out(range(num_slots)).array(len(words)),
+            "slot": Out(range(max(slots))).array(len(words)),
             "asked": In(asked).array(len(words)),
             "answer": In(answer_layout(tag_width=self._tag.size)),
             "data": Out(stream.Signature(32, always_ready=True)).array(len(words)),
@@ -56,7 +56,7 @@ class ReturnBuffer(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        num_ports, num_slots = len(self._words), self._num_slots
+        num_ports, num_slots = len(self._words), max(self._slots)
         tag = Signal(self._tag)
         m.submodules.storage = storage = BlockMemory(32, depth=num_ports * num_slots * MAX_WORDS)
         m.d.comb += [
@@ -109,7 +109,7 @@ class ReturnBuffer(wiring.Component):
 
     def _keep_account(self, m, port, tag, is_done, starts, ends):
         """The slots of one port: which is the first to leave, and how many are taken."""
-        num_slots, asked = self._num_slots, self.asked[port]
+        num_slots, asked = self._slots[port], self.asked[port]
         first = Signal(range(num_slots), name=f"first_{port}")
         taken, waiting = (Signal(range(num_slots + 1), name=f"{name}_{port}") for name in ("taken", "waiting"))
         missing = Signal(data.ArrayLayout(2, num_slots), name=f"missing_{port}")
@@ -130,7 +130,7 @@ class ReturnBuffer(wiring.Component):
                 m.d.sync += missing[slot].eq(Cat(1, asked.split))
         if num_slots > 1:
             with m.If(whole):
-                m.d.sync += self.slot[port].eq(self.slot[port] + 1)
+                m.d.sync += self.slot[port].eq((self.slot[port] + 1)[:ceil_log2(num_slots)])
             with m.If(starts):
                 m.d.sync += first.eq(first + 1)
         return first, taken

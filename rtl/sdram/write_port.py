@@ -20,7 +20,8 @@ def write_layout(chip):
 class WritePort(wiring.Component):
     """Keeps up to 16 words until the controller fetches them, and asks for them in batches.
 
-    Turning the data lines round costs the time of three words, so it waits until there are several; but not for long.
+    Turning the data lines round costs the time of three words, so it waits until there are several, but not for long;
+    then they are urgent until all are taken, as a single word has less of the memory than others' lines.
 
     Parameters
     ----------
@@ -34,7 +35,8 @@ class WritePort(wiring.Component):
     Members
     -------
     i : stream of words to write
-    address, slot : stream of what to ask the controller for: addresses, and by which tags it fetches
+    request : stream of what to ask the controller for: addresses, and the slots by which it fetches
+    urgent : they should be taken soon
     fetch, store : to and from the controller
     idle : everything taken has been fetched
     """
@@ -47,6 +49,7 @@ class WritePort(wiring.Component):
         super().__init__({
             "i": In(stream.Signature(write_layout(chip))),
             "request": Out(stream.Signature(request)),
+            "urgent": Out(1),
             "fetch": In(data.StructLayout({"valid": 1, "tag": SLOT_WIDTH})),
             "store": Out(store_layout()),
             "idle": Out(1),
@@ -81,6 +84,7 @@ class WritePort(wiring.Component):
         patience = Signal(range(self._patience + 1), init=self._patience)
         m.d.comb += [
             self.request.valid.eq(addresses.o.valid & flushing),
+            self.urgent.eq(flushing),
             self.request.payload.address.eq(addresses.o.payload),
             self.request.payload.slot.eq(first),
             addresses.o.ready.eq(self.request.ready & flushing),

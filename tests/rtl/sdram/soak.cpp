@@ -71,6 +71,7 @@ struct Soak {
     std::vector<Writer> writers;
     // Pixels a cycle, where the beam is, and how many pixels there are in a word
     double display_rate = 0, display_owed = 0;
+    uint64_t display_from = 60000;
     uint32_t beam_x = 0, beam_y = 0, pixels_per_word = 1;
     bool wants_word = false;
     uint32_t display_first = 0, display_count = 0, display_at = 0;
@@ -211,7 +212,9 @@ struct Soak {
     void offer_display() {
         dut->display_frame_valid = display_count > 0;
         dut->display_frame_payload = QData(display_first / 16) | QData(display_count / 16 - 1) << 19;
-        display_owed += display_rate;
+        // The display is switched on when its port has had time to fill.
+        if (counts.shown_words == 0 && !wants_word) wants_word = dut->display_word_valid;
+        if (cycle > display_from) display_owed += display_rate;
         if (display_owed >= 1) {
             display_owed -= 1;
             // 640x480 at 60 Hz: 800 by 525 pixels with their borders
