@@ -220,7 +220,10 @@ class Chip {
 
     void precharge(unsigned number, const char* what) {
         Bank& bank = banks[number];
-        if (bank.row < 0) return;
+        if (bank.row < 0) {
+            bank.precharged = cycle;
+            return;
+        }
         wait("tRAS", number, bank.activated, ras, what);
         if (int64_t(cycle) - bank.activated > ras_max) refuse("tRAS max", number, "a row was open too long");
         if (write_left > 0 && write_bank == number) refuse("tWR", number, "PRECHARGE before the burst is written");

@@ -76,12 +76,16 @@ class SdramChip:
     power_up : float, optional
         Another time in ns than the datasheet's that it waits at power-up, for short simulations.
 
-    Members
-    -------
-    cycle : edges so far
-    commands : how often each was given, by name
-    contents : halfwords by (bank, row, column)
-    data_cycles : edges at which data were on the lines
+    Attributes
+    ----------
+    cycle : int
+        Edges so far.
+    commands : dict from str to int
+        How often each was given.
+    contents : dict from (int, int, int) to int
+        Halfwords by bank, row and column.
+    data_cycles : int
+        Edges at which data were on the lines.
     """
 
     def __init__(self, datasheet, *, period, power_up=None):
@@ -142,8 +146,8 @@ class SdramChip:
         command = ras_n << 2 | cas_n << 1 | we_n
         if not cs_n and cke and command != 0b111:
             self._obey(command, ba, a)
-        self._store(dqm, dq)
         self.data_cycles += drives or self._write is not None
+        self._store(dqm, dq)
         self.cycle += 1
         return self._output(dqm)
 
@@ -215,18 +219,20 @@ class SdramChip:
 
     def _precharge(self, number, a):
         self._closed_at_all |= a >> 10 & 1
-        for number in range(len(self._banks)) if a >> 10 & 1 else (number,):
-            bank = self._banks[number]
-            if bank.row is None:
-                continue
+        for each in range(len(self._banks)) if a >> 10 & 1 else (number,):
+            self._close(each)
+
+    def _close(self, number):
+        bank = self._banks[number]
+        if bank.row is not None:
             self._wait("tRAS", number, bank.activated, self._sheet.tras, "PRECHARGE")
             if (self.cycle - bank.activated) * self._period > self._sheet.tras_max:
                 self._refuse("tRAS max", number, f"row {bank.row} was open for longer than {self._sheet.tras_max:g} ns")
             if self._write is not None and self._write[0] == number:
                 self._refuse("tWR", number, "PRECHARGE before the burst is written")
             self._wait("tWR", number, bank.written, self._sheet.twr, "PRECHARGE")
-            bank.row, bank.precharged = None, self.cycle
             self._cut(self.cycle, number)
+        bank.row, bank.precharged = None, self.cycle
 
     def _activate(self, number, a):
         bank = self._banks[number]

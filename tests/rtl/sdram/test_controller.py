@@ -8,7 +8,7 @@ import pytest
 from rtl.sdram.controller import Controller
 from rtl.sdram.timing import AS4C16M16SA_6, AS4C16M16SA_7, MT48LC16M16A2_75, SLOWEST, SdramTiming
 from sim.machine.sdram_chip import DATASHEETS, SdramChip, sdram_bench
-from tests.bench import drain, feed, simulate, until
+from tests.bench import feed, simulate, until
 
 TAG_WIDTH = 8
 POWER_UP_NS = 2_000
@@ -41,7 +41,7 @@ def random_accesses(rng, count, *, writes, rows, sequential=False):
 
 
 def run(timing, accesses, stores, *, datasheet, seed=0, gap=0.0, ticks=200_000, quiet=40):
-    """Does accesses, and checks each word read; returns the chip, and the cycles from the first answer to the last one."""
+    """Does accesses and checks each word read; returns the chip, and the cycles from the first answer to the last."""
     rng = random.Random(seed)
     dut = Controller(timing=timing, tag_width=TAG_WIDTH)
     chip = SdramChip(DATASHEETS[datasheet], period=1000 / timing.clock_mhz, power_up=POWER_UP_NS)
@@ -66,9 +66,9 @@ def run(timing, accesses, stores, *, datasheet, seed=0, gap=0.0, ticks=200_000, 
 
     async def observe(ctx):
         fetched = None
-        async for (_, _, valid, ready, fetch, tag, answer, word, place, answer_tag, last, now) in ctx.tick().sample(
+        async for (_, _, valid, ready, fetch, tag, answer, word, place, answer_tag, last) in ctx.tick().sample(
                 dut.access.valid, dut.access.ready, dut.fetch.valid, dut.fetch.tag, dut.answer.valid, dut.answer.word,
-                dut.answer.place, dut.answer.tag, dut.answer.last, dut.ready):
+                dut.answer.place, dut.answer.tag, dut.answer.last):
             if valid and ready:
                 expect(taken[0])
                 taken[0] += 1
@@ -99,7 +99,8 @@ def run(timing, accesses, stores, *, datasheet, seed=0, gap=0.0, ticks=200_000, 
 @pytest.mark.parametrize(("seed", "clock_mhz", "datasheet", "gap", "writes", "rows"), [
     (0, 100, "AS4C16M16SA-7", 0.0, 0.3, 3), (1, 125, "AS4C16M16SA-6", 0.2, 0.5, 8000),
     (2, 133, "MT48LC16M16A2-75", 0.0, 0.2, 2), (3, 142, "AS4C16M16SA-7", 0.9, 0.4, 2),
-    (4, 80, "MT48LC16M16A2-75", 0.0, 1.0, 2), (5, 125, "AS4C16M16SA-7", 0.5, 0.1, 1), (6, 166, "AS4C16M16SA-6", 0, 0.3, 3)])
+    (4, 80, "MT48LC16M16A2-75", 0.0, 1.0, 2), (5, 125, "AS4C16M16SA-7", 0.5, 0.1, 1),
+    (6, 166, "AS4C16M16SA-6", 0.0, 0.3, 3)])
 def test_random_accesses(seed, clock_mhz, datasheet, gap, writes, rows):
     rng = random.Random(seed)
     accesses, stores = random_accesses(rng, 250, writes=writes, rows=rows)
