@@ -315,6 +315,10 @@ void soak_counts(Soak* soak, Counts* counts) {
     *counts = soak->counts;
 }
 
+void soak_damage(Soak* soak, uint32_t address) {
+    soak->chip.contents[sdram::Chip::place(address >> 8 & 3, address >> 10, (address & 255) << 1)] ^= 1;
+}
+
 const char* soak_message(Soak* soak) {
     return soak->chip.violations ? soak->chip.first_violation.c_str() : soak->first_error.c_str();
 }

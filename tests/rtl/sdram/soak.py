@@ -1,7 +1,7 @@
 """A hundred million random accesses to a simulated SDRAM, none of them wrong; and how many megabytes a second it gives.
 
-The traffic of the long run is a chip's, at random: readers of lines of 16, 16, 36, 36, 16 and 4 bytes, two writers and
-a display, all over the memory at once, and every now and then in a few rows of it only.
+The traffic of the long run is random: readers of lines of 8, 16, 36 and 4 bytes, two writers and a display, all over
+the memory at once, and every now and then in a few rows of it only.
 """
 
 import importlib.metadata
@@ -18,6 +18,8 @@ __all__ = ["CHIP_WORDS", "measure", "soak"]
 
 #: Words of a line, for each reader of a chip with textures and a host.
 CHIP_WORDS = [4, 4, 9, 9, 4, 1]
+#: Likewise in the long run, short so that there are many
+_SOAK_WORDS = [2, 4, 9, 1]
 #: Accesses after which the traffic moves elsewhere
 _PERIOD = 1_000_000
 #: Words of a picture of 640×480 with 32 bits a pixel, shown from the beginning of the memory
@@ -26,27 +28,26 @@ _SUMS = ("accesses", "cycles", "read_words", "written_words", "shown_words", "da
          "underruns")
 
 
-def chip_traffic(run, *, place, rate=0.2):
+def _everywhere(run, *, place, rate=0.2):
     """Random traffic on all ports, in a place (first word, number of words)."""
     first, count = place
-    for number in range(len(CHIP_WORDS)):
-        # The lines are short so that there are many, those of 36 bytes rare.
-        run.read(number, rate=rate if CHIP_WORDS[number] < 9 else rate / 50, first=first, count=count)
+    for number, words in enumerate(_SOAK_WORDS):
+        run.read(number, rate=rate if words < 9 else rate / 50, first=first, count=count)
     for number in range(2):
         run.write(number, rate=0.1, first=first, count=count)
 
 
-def soak(accesses, *, clock_mhz=125.0, part="MT48LC16M16A2-75", seed=1, progress=lambda text: None, optimise="-O2"):
+def soak(accesses, *, clock_mhz=125.0, part="MT48LC16M16A2-75", seed=1, progress=lambda text: None, optimise="-O3"):
     """Counts of a run that checks each word; it ends at the first error."""
     # In multiples of lines of 16 and of 9 words
     everywhere = (0, NUM_WORDS // 144 * 144)
     places = [everywhere, (144 * 30_000, 144 * 16), everywhere, (144 * 100, 144 * 4000)]
-    with Soak(CHIP_WORDS, num_writers=2, display=True, clock_mhz=clock_mhz, part=part, seed=seed, optimise=optimise,
+    with Soak(_SOAK_WORDS, num_writers=2, display=True, clock_mhz=clock_mhz, part=part, seed=seed, optimise=optimise,
               progress=progress) as run:
-        run.show(bits=32)
+        run.show(bits=16)
         counts, period = {"accesses": 0}, 0
         while counts["accesses"] < accesses:
-            chip_traffic(run, place=places[period % len(places)])
+            _everywhere(run, place=places[period % len(places)])
             counts = run.run(min(_PERIOD, accesses - counts["accesses"]),
                              finish=counts["accesses"] + _PERIOD >= accesses)
             period += 1

@@ -7,7 +7,7 @@ import pytest
 
 from rtl.sdram.controller import Controller
 from rtl.sdram.timing import AS4C16M16SA_6, AS4C16M16SA_7, MT48LC16M16A2_75, SLOWEST, SdramTiming
-from sim.machine.sdram_chip import DATASHEETS, SdramChip, sdram_bench
+from sim.machine.sdram_chip import DATASHEETS, SdramChip, SdramViolation, sdram_bench
 from tests.bench import feed, simulate, until
 
 TAG_WIDTH = 8
@@ -127,3 +127,20 @@ def test_rows_are_opened_while_words_of_others_move():
     chip, cycles = run(timing, accesses, {}, datasheet="MT48LC16M16A2-75")
     assert chip.commands["ACTIVE"] >= 100
     assert cycles <= 2 * 8 * len(accesses) + 30 * (chip.commands["AUTO REFRESH"] - 8) + 20
+
+
+@pytest.mark.parametrize(("name", "rule"), [
+    ("rp", "tRP"), ("rfc", "tRFC"), ("write_to_precharge", "tWR"), ("read_to_write", "contention")])
+def test_a_distance_too_short_would_be_noticed(name, rule):
+    accesses, stores = random_accesses(random.Random(0), 60, writes=0.5, rows=3)
+    timing = SdramTiming(SLOWEST, clock_mhz=125, power_up_ns=POWER_UP_NS)
+    setattr(timing, name, getattr(timing, name) - 1)
+    with pytest.raises(SdramViolation, match=f"^{rule}: "):
+        run(timing, accesses, stores, datasheet="MT48LC16M16A2-75")
+
+
+def test_a_latency_too_short_would_be_noticed():
+    timing = SdramTiming(SLOWEST, clock_mhz=125, power_up_ns=POWER_UP_NS)
+    timing.cas_latency = 2
+    with pytest.raises(SdramViolation, match=r"^tCK: all banks, cycle \d+: CAS latency 2 needs 10 ns"):
+        run(timing, [{"write": 0, "address": 0, "left": 0, "place": 0, "tag": 0}], {}, datasheet="AS4C16M16SA-7")

@@ -36,16 +36,16 @@ class Soak:
         Clock of both.
     part : str
         One of :data:`PARTS`.
-    timing : SdramTiming, optional
-        What the controller believes, if not the slowest chip's at this clock.
+    chip_mhz : float, optional
+        Another clock by which the chip judges.
     seed : int
         Of the traffic.
     """
 
-    def __init__(self, words, *, num_writers=0, display=False, clock_mhz=125.0, part="MT48LC16M16A2-75", timing=None,
+    def __init__(self, words, *, num_writers=0, display=False, clock_mhz=125.0, part="MT48LC16M16A2-75", chip_mhz=None,
                  seed=1, optimise="-O2", progress=lambda text: None):
         readers = {f"r{number}": (each, (NUM_WORDS // each - 1).bit_length()) for number, each in enumerate(words)}
-        dut = SdramMemory(timing=timing or SdramTiming(SLOWEST, clock_mhz=clock_mhz), readers=readers,
+        dut = SdramMemory(timing=SdramTiming(SLOWEST, clock_mhz=clock_mhz), readers=readers,
                           num_writers=num_writers, display=display)
         ports = "".join([*(f"READER({number})" for number in range(len(words))),
                          *(f"WRITER({number})" for number in range(num_writers))])
@@ -55,11 +55,13 @@ class Soak:
         library.soak_new.restype = c_void_p
         library.soak_message.restype = c_char_p
         self.clock_mhz = clock_mhz
-        self._soak = c_void_p(library.soak_new(PARTS.index(part), c_double(1000 / clock_mhz), c_uint64(seed),
-                                               (c_uint32 * len(words))(*words), len(words), num_writers))
+        self._soak = c_void_p(library.soak_new(
+            PARTS.index(part), c_double(1000 / (chip_mhz or clock_mhz)), c_uint64(seed),
+            (c_uint32 * len(words))(*words), len(words), num_writers))
 
     def close(self):
         """Ends the simulation."""
+        self.last_message = self.message
         self._library.soak_delete(self._soak)
 
     def __enter__(self):
@@ -82,6 +84,10 @@ class Soak:
         """Shows 640×480 at 60 Hz, with so many bits a pixel."""
         self._library.soak_display(self._soak, c_double(25.175 / self.clock_mhz), c_uint32(32 // bits),
                                    c_uint32(first), c_uint32(640 * 480 * bits // 32))
+
+    def damage(self, address):
+        """Changes a word in the chip."""
+        self._library.soak_damage(self._soak, c_uint32(address))
 
     def run(self, accesses, *, max_cycles=1 << 62, finish=False):
         """Does so many accesses more; ends at the first that is wrong. Returns all counts until now."""
