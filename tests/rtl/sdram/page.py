@@ -30,8 +30,8 @@ def _times(results):
     rows.append(("between refreshes", *(f"{chip.t_refresh / 8192:g}" for chip in chips.values()),
                  *(2 * timing.refresh for timing in timings)))
     rows.append(("CAS latency, cycles", *["2 to 100 MHz, then 3"] * len(chips), *(t.cas_latency for t in timings)))
-    return markdown_table(("time", *(f"{name}, ns" for name in chips), *(f"cycles at {clock} MHz" for clock in _CLOCKS)),
-                          rows)
+    head = ("time", *(f"{name}, ns" for name in chips), *(f"cycles at {clock} MHz" for clock in _CLOCKS))
+    return markdown_table(head, rows)
 
 
 def _speed(results):
