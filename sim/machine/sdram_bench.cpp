@@ -70,6 +70,8 @@ struct Bench {
         chip->pixel_ready = 1;
         for (int number = 0; number < 2; ++number) tick();
         chip->rst = 0;
+        // The memory takes its time after power-up.
+        while (!chip->ready && cycle < 1000000) tick();
     }
 
     ~Bench() { chip->final(); }
@@ -99,11 +101,6 @@ struct Bench {
     Status run(uint64_t max_cycles, uint64_t hang_cycles, uint32_t coord_width, uint32_t thread_width, uint32_t width,
                uint32_t height, uint32_t pixel_words, uint32_t* pixels, uint64_t* written, uint64_t* begun,
                uint32_t num_packets) {
-        // The memory takes its time after power-up.
-        while (!chip->ready) {
-            if (cycle > 1000000) return HUNG;
-            tick();
-        }
         uint64_t end = cycle + max_cycles, first = cycle;
         uint32_t packets = 0;
         quiet_since = cycle;

@@ -29,7 +29,7 @@ def test_the_picture_is_the_models(scene):
     assert sdram["bytes"] == sum(report["bytes"].values()) + 4 * size[0] * size[1]
     assert 0 < sdram["busy"] < 1
     assert sdram["busy"] == pytest.approx(sdram["bytes"] / 2 / report["cycles"], rel=0.01)
-    assert abs(sdram["refreshes"] - report["cycles"] / 976) <= 2
+    assert abs(sdram["refreshes"] - report["cycles"] / 974) <= 2
 
 
 def test_what_cannot_be():
