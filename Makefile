@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart stability clean
+.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart stability sdram clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -17,6 +17,7 @@ help:
 	@echo "make pipeline     the figures of docs/pipeline.md: full shading on the simulated chip"
 	@echo "make chart        accuracy over formats and arithmetics, for docs/accuracy.md"
 	@echo "make stability    where ray/triangle tests fail, the chip's and others': the figures of docs/accuracy.md"
+	@echo "make sdram        the figures of docs/memory.md: a hundred million random accesses to an SDRAM, and its speed"
 	@echo "make mutants      faults planted in the operators, each found by a test: docs/results/mutants.json"
 
 setup: $(VENV)/.ready
@@ -60,6 +61,13 @@ chart: setup
 
 stability: setup
 	$(BIN)/dynrt stability
+
+sdram: setup
+	$(BIN)/python -m tests.rtl.sdram.soak --output docs/results/sdram.json
+	$(BIN)/python -m tests.rtl.sdram.place --output docs/results/sdram.json
+	@mkdir -p build
+	$(BIN)/dynrt render room --memory sdram --output build/sdram-room.png --report docs/results/sdram-room.json
+	$(BIN)/python -m tests.rtl.sdram.page
 
 clean:
 	rm -rf build .pytest_cache .ruff_cache

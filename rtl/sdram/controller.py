@@ -41,8 +41,7 @@ class Controller(wiring.Component):
     access waits for ever: see :class:`~.least_recent.LeastRecent`, :class:`~.direction.Direction` and
     :class:`~.upkeep.Upkeep`.
 
-    Latency is 14 + CAS latency cycles from an access to the first word if all is idle, its bank closed, and the clock
-    133 MHz; throughput is a word in two cycles.
+    Throughput is a word in two cycles; for latency see :class:`~.memory.SdramMemory`.
 
     Parameters
     ----------

@@ -25,8 +25,9 @@ class SdramMemory(wiring.Component):
     Each reader gets its lines in the order in which it asked, though the memory fetches them in another. Accesses of
     different ports may overtake each other: what is to be read as it was just written waits for ``written``.
 
-    Latency is some 25 cycles from a request to the first word if all is idle. Together all have a word in two cycles
-    at most.
+    At 125 MHz, latency from a request to the first word is 26 to 31 cycles for a line of one word if all else is idle,
+    the longer if another row of its bank is open, and 2 more for each further word, as lines leave whole. Together all
+    have a word in two cycles at most.
 
     Parameters
     ----------

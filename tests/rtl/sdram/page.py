@@ -1,4 +1,4 @@
-"""The tables of docs/memory.md, from docs/results/sdram.json and the chips' times."""
+"""The tables of docs/memory.md, from docs/results/sdram.json, sdram-room.json and the chips' times."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from tools.errors import BadInput
 from tools.page import filled_page, markdown_table
 from tools.results import earlier_results, write_texts
 
-__all__ = ["PARTS"]
+__all__ = ["PARTS", "page_text"]
 
 #: Clocks whose cycles are shown
 _CLOCKS = (100, 125, 133)
@@ -65,18 +65,37 @@ def _area(results):
                             ", ".join(map(str, area["seeds"])), f"{area['worst_mhz']:.1f}", f"{area['best_mhz']:.1f}"]])
 
 
+def _room(results):
+    room = results.get("room")
+    if not room:
+        return markdown_table((), ())
+    sdram = room["sdram"]
+    return markdown_table(
+        ("picture", "cycles a ray", "bytes a ray", "data lines busy", "rows opened a ray", "refreshes",
+         "pixels unlike the model's"),
+        [[" × ".join(map(str, room["size"])), f"{room['cycles_per_ray']:.2f}", f"{sdram['bytes'] / room['rays']:.2f}",
+          f"{100 * sdram['busy']:.1f} %", f"{sdram['activations'] / room['rays']:.2f}", sdram["refreshes"],
+          room["wrong_pixels_vs_model"]]])
+
+
 #: Of each table of the page what makes it.
-PARTS = {"times": _times, "speed": _speed, "soak": _soak, "area": _area}
+PARTS = {"times": _times, "speed": _speed, "soak": _soak, "area": _area, "room": _room}
+
+
+def page_text(docs):
+    """The page with its tables filled."""
+    folder = docs / "results"
+    results = earlier_results(folder / "sdram.json")
+    if not results:
+        raise BadInput(f"{folder / 'sdram.json'}: is not there; run python -m tests.rtl.sdram.soak first")
+    return filled_page(docs / "memory.md", PARTS, {**results, "room": earlier_results(folder / "sdram-room.json")})
 
 
 @click.command()
 @click.option("--docs", default="docs", show_default=True, type=click.Path(file_okay=False, path_type=Path))
 def main(docs):
     """Fill the tables of docs/memory.md."""
-    results = earlier_results(docs / "results" / "sdram.json")
-    if not results:
-        raise BadInput(f"{docs / 'results' / 'sdram.json'}: is not there; run python -m tests.rtl.sdram.soak first")
-    write_texts({docs / "memory.md": filled_page(docs / "memory.md", PARTS, results)})
+    write_texts({docs / "memory.md": page_text(docs)})
 
 
 if __name__ == "__main__":

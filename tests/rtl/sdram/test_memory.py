@@ -128,3 +128,32 @@ def test_every_port_gets_its_words_in_order(seed, readers, num_writers, display,
             place = address >> 8 & 3, address >> 10, address % 256 << 1
             got = chip.contents.get(place, 0) | chip.contents.get((*place[:2], place[2] + 1), 0) << 16
             assert got == value, f"word {address}"
+
+
+@pytest.mark.parametrize("words", [1, 4, 8])
+def test_latency_of_a_line_alone(words):
+    """From a request to its first word, with its bank closed or another row open, in whichever cycle of a slot."""
+    timing = SdramTiming(SLOWEST, clock_mhz=125, power_up_ns=POWER_UP_NS)
+    chip = SdramChip(DATASHEETS["AS4C16M16SA-7"], period=8, power_up=POWER_UP_NS)
+    dut = SdramMemory(timing=timing, readers={"a": (words, 18)})
+    waits = set()
+
+    async def ask(ctx):
+        while not ctx.get(dut.ready):
+            await ctx.tick()
+        for line in range(12):
+            # Another row of another bank
+            ctx.set(dut.a_request.payload, line * 1000)
+            ctx.set(dut.a_request.valid, 1)
+            await ctx.tick()
+            ctx.set(dut.a_request.valid, 0)
+            wait = 1
+            while not ctx.get(dut.a_data.valid):
+                await ctx.tick()
+                wait += 1
+            waits.add(wait)
+            await ctx.tick().repeat(60 + line)
+
+    simulate(dut, ask, ticks=5000, name="memory", background=(sdram_bench(dut.pins, chip),))
+    more = 2 * (words - 1)
+    assert 26 + more <= min(waits) <= max(waits) <= 31 + more, waits
