@@ -277,16 +277,20 @@ class SdramChip:
                            if at < cycle + self._latency or number not in (None, value[0])}
 
 
-def sdram_bench(pins, chip):
+def sdram_bench(pins, chip, *, delay=0):
     """Background testbench that connects a chip to a controller's pins, see :func:`~rtl.sdram.commands.pins_signature`.
 
-    Command and data that registers put out are sampled at the next edge.
+    Command and data that registers put out are sampled at the next edge; what the chip drives is late by ``delay``
+    cycles.
     """
     async def testbench(ctx):
+        late = deque([None] * delay)
         sampled = (pins.cke, pins.cs_n, pins.ras_n, pins.cas_n, pins.we_n, pins.ba, pins.a, pins.dqm, pins.dq_o,
                    pins.dq_oe)
         async for _, _, cke, cs_n, ras_n, cas_n, we_n, ba, a, dqm, dq_o, dq_oe in ctx.tick().sample(*sampled):
             driven = chip.edge(cke=cke, cs_n=cs_n, ras_n=ras_n, cas_n=cas_n, we_n=we_n, ba=ba, a=a, dqm=dqm,
                                dq=dq_o if dq_oe else None)
+            late.append(driven)
+            driven = late.popleft()
             ctx.set(pins.dq_i, _NOTHING if driven is None else driven)
     return testbench

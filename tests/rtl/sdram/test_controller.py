@@ -40,10 +40,10 @@ def random_accesses(rng, count, *, writes, rows, sequential=False):
     return accesses, stores
 
 
-def run(timing, accesses, stores, *, datasheet, seed=0, gap=0.0, ticks=200_000, quiet=40):
+def run(timing, accesses, stores, *, datasheet, seed=0, gap=0.0, delay=0, ticks=200_000, quiet=40):
     """Does accesses and checks each word read; returns the chip, and the cycles from the first answer to the last."""
     rng = random.Random(seed)
-    dut = Controller(timing=timing, tag_width=TAG_WIDTH)
+    dut = Controller(timing=timing, tag_width=TAG_WIDTH, input_delay=delay)
     chip = SdramChip(DATASHEETS[datasheet], period=1000 / timing.clock_mhz, power_up=POWER_UP_NS)
     memory, expected = {}, {}
     by_tag = {}
@@ -89,7 +89,7 @@ def run(timing, accesses, stores, *, datasheet, seed=0, gap=0.0, ticks=200_000, 
                 span[1] = chip.cycle
 
     simulate(dut, until(lambda: done[0] == len(accesses), quiet=quiet), ticks=ticks, name="controller", background=(
-        sdram_bench(dut.pins, chip), observe, feed(dut.access, deque(accesses), rng=rng, gap=gap)))
+        sdram_bench(dut.pins, chip, delay=delay), observe, feed(dut.access, deque(accesses), rng=rng, gap=gap)))
     assert not any(expected.values())
     for address, value in memory.items():
         assert word_at(chip.contents, address) == value
@@ -107,6 +107,13 @@ def test_random_accesses(seed, clock_mhz, datasheet, gap, writes, rows):
     timing = SdramTiming(PARTS[datasheet], clock_mhz=clock_mhz, power_up_ns=POWER_UP_NS)
     chip, _ = run(timing, accesses, stores, datasheet=datasheet, seed=seed, gap=gap)
     assert chip.commands["AUTO REFRESH"] >= 8
+
+
+@pytest.mark.parametrize("delay", [1, 2])
+def test_words_that_come_late(delay):
+    accesses, stores = random_accesses(random.Random(delay), 60, writes=0.3, rows=2)
+    timing = SdramTiming(SLOWEST, clock_mhz=125, power_up_ns=POWER_UP_NS)
+    run(timing, accesses, stores, datasheet="AS4C16M16SA-7", delay=delay)
 
 
 def test_words_of_rows_follow_each_other_without_a_gap():

@@ -136,7 +136,7 @@ def test_latency_of_a_line_alone(words):
     timing = SdramTiming(SLOWEST, clock_mhz=125, power_up_ns=POWER_UP_NS)
     chip = SdramChip(DATASHEETS["AS4C16M16SA-7"], period=8, power_up=POWER_UP_NS)
     dut = SdramMemory(timing=timing, readers={"a": (words, 18)})
-    waits = set()
+    waits = []
 
     async def ask(ctx):
         while not ctx.get(dut.ready):
@@ -151,9 +151,11 @@ def test_latency_of_a_line_alone(words):
             while not ctx.get(dut.a_data.valid):
                 await ctx.tick()
                 wait += 1
-            waits.add(wait)
+            waits.append(wait)
             await ctx.tick().repeat(60 + line)
 
     simulate(dut, ask, ticks=5000, name="memory", background=(sdram_bench(dut.pins, chip),))
     more = 2 * (words - 1)
-    assert 26 + more <= min(waits) <= max(waits) <= 31 + more, waits
+    # A refresh may come in between once.
+    *usual, _ = sorted(waits)
+    assert 26 + more <= usual[0] <= usual[-1] <= 31 + more, waits
