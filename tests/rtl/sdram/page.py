@@ -50,10 +50,10 @@ def _soak(results):
     if not soak:
         return markdown_table((), ())
     return markdown_table(("accesses", "cycles", "wrong words", "violations", "refreshes", "rows opened", "words read",
-                           "words written", "words shown", "longest time for a line, cycles"),
+                           "words written", "words shown"),
                           [[f"{soak[name]:,}" for name in (
                               "accesses", "cycles", "errors", "violations", "refreshes", "activations", "read_words",
-                              "written_words", "shown_words", "longest_wait")]])
+                              "written_words", "shown_words")]])
 
 
 def _area(results):
