@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart stability cracks clean
+.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart stability cracks sdram clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -18,6 +18,7 @@ help:
 	@echo "make chart        accuracy over formats and arithmetics, for docs/accuracy.md"
 	@echo "make stability    where ray/triangle tests fail, the chip's and others': the figures of docs/accuracy.md"
 	@echo "make cracks       a hundred million rays at the edges of real meshes, for docs/accuracy.md"
+	@echo "make sdram        the figures of docs/memory.md: a hundred million random accesses to an SDRAM, and its speed"
 	@echo "make mutants      faults planted in the operators, each found by a test: docs/results/mutants.json"
 
 setup: $(VENV)/.ready
@@ -64,6 +65,13 @@ stability: setup
 
 cracks: setup
 	$(BIN)/dynrt cracks --scenes $(SCENES)
+
+sdram: setup
+	$(BIN)/python -m tests.rtl.sdram.soak --output docs/results/sdram.json
+	$(BIN)/python -m tests.rtl.sdram.place --output docs/results/sdram.json
+	@mkdir -p build
+	$(BIN)/dynrt render room --memory sdram --output build/sdram-room.png --report docs/results/sdram-room.json
+	$(BIN)/python -m tests.rtl.sdram.page
 
 clean:
 	rm -rf build .pytest_cache .ruff_cache

@@ -8,14 +8,17 @@ from dataclasses import dataclass, replace
 from rtl.config import ChipConfig
 from sim.golden import render_golden
 from sim.machine import render_frames, render_pysim, render_rtl
+from sim.machine.sdram_bench import render_sdram
 from sim.model import render_full, render_model
 from sim.scene.slots import upload_report
 
 from .errors import BadInput
 
-__all__ = ["ENGINES", "Order", "draw", "model_picture", "progress_on"]
+__all__ = ["ENGINES", "MEMORIES", "Order", "draw", "model_picture", "progress_on"]
 
 ENGINES = ("golden", "model", "rtl", "pysim")
+#: What the Verilated chip reads from: a memory for each port that answers after a while, or one SDRAM.
+MEMORIES = ("latency", "sdram")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,8 +38,10 @@ class Order:
     depth : int
         Of full shading.
     background : tuple of int
+    memory : str
+        One of :data:`MEMORIES`.
     latency, jitter, seed : int
-        Of the simulated memories.
+        Of the simulated memories, if they are those of a fixed latency.
     wave : path, optional
     wave_cycles, wave_pixels
         As of :func:`~sim.machine.machine.render_rtl`.
@@ -48,6 +53,7 @@ class Order:
     shading: str = "simple"
     depth: int = 4
     background: tuple = (0, 0, 0)
+    memory: str = "latency"
     latency: int = 4
     jitter: int = 0
     seed: int = 1
@@ -161,6 +167,8 @@ def _frames(order, compiled, poses, is_moving, console):
 def _picture(order, image, camera, config, progress):
     if order.engine == "model":
         return model_picture(order, image, camera, config)
+    if order.memory == "sdram":
+        return render_sdram(image, camera, *order.size, config=config, background=order.background, progress=progress)
     common = dict(config=config, background=order.background, latency=order.latency, wave=order.wave,
                   progress=progress)
     if order.engine == "pysim":

@@ -9,6 +9,7 @@ import click
 import numpy as np
 from rich.console import Console
 
+from rtl.memory_system import FRAME_STRIDE
 from sim.golden import MAX_DEPTH, SHADINGS, psnr, render_golden
 from sim.scene import Sky, load_scene
 from sim.scene.compile import CompiledScene
@@ -16,7 +17,7 @@ from sim.scene.limits import limit_warnings
 from sim.scene.texture import decode_texture
 
 from .animation import frame_durations, save_animation, save_picture
-from .engines import ENGINES, Order, draw, model_picture, progress_on
+from .engines import ENGINES, MEMORIES, Order, draw, model_picture, progress_on
 from .errors import BadInput, clear_errors, written_whole
 from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, camera_of, chip_config
 
@@ -54,6 +55,8 @@ _CHECKED_PIXELS = 1 << 21
               help="Where the chip's numbers are finest, of a scene of instances")
 @click.option("--chip", "parameters", type=CHIP, multiple=True, help="A parameter of the chip, see "
               "rtl/config.py, or a file with them, such as dynrt fit writes")
+@click.option("--memory", type=click.Choice(MEMORIES), default="latency", show_default=True, help="What the simulated "
+              "chip reads from: memories that answer after --latency cycles, or an SDRAM at 125 MHz")
 @click.option("--latency", type=click.IntRange(1, 1000), default=4, show_default=True,
               help="Cycles from a memory request to its first word")
 @click.option("--jitter", type=click.IntRange(0, 1000), default=0, show_default=True,
@@ -67,7 +70,7 @@ _CHECKED_PIXELS = 1 << 21
 @click.option("--report", type=click.Path(dir_okay=False, path_type=Path), help="JSON to write")
 @click.option("--check/--no-check", default=True, help="Compare with the model and with golden")
 def render(scene, output, engine, size, fmt, camera, view, frames, shading, depth, sky, background, flatten,
-           center, parameters, latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
+           center, parameters, memory, latency, jitter, seed, wave, wave_cycles, wave_pixels, hits, report, check):
     """Draw SCENE: an .obj, .ply, .ply.gz, .gltf, .glb or .md3 file, a map in a .pk3 (FILE.pk3, or FILE.pk3:MAP where it
     has several), or a built-in one: room, mirror-room, vpl, walk or sunflowers."""
     config = chip_config(fmt, parameters)
@@ -76,7 +79,7 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
     if depth is None:
         depth = 4 if config.shader is None else config.shader.depth
     order = Order(engine=engine, size=size, config=config, shading=shading, depth=depth, background=background,
-                  latency=latency, jitter=jitter, seed=seed, wave=wave, wave_cycles=wave_cycles,
+                  memory=memory, latency=latency, jitter=jitter, seed=seed, wave=wave, wave_cycles=wave_cycles,
                   wave_pixels=wave_pixels)
     output = output or Path(f"{Path(scene).name.split('.')[0]}.png")
     _check_options(order, output, frames, hits)
@@ -167,6 +170,14 @@ def _check_options(order, output, frames, hits):
         raise click.UsageError(f"-o: {output.name} would be an animation; give --frames, or a name that ends in .png")
     if not _is_gif(output) and output.suffix.lower() != ".png":
         raise click.UsageError(f"-o: {output.name} must end in .png{', or .gif' if frames else ''}")
+    if order.memory == "sdram":
+        if engine != "rtl":
+            raise click.UsageError(f"--memory sdram works with --engine rtl only, not {engine}")
+        if frames or wave is not None or order.jitter:
+            raise click.UsageError("--memory sdram: leave --frames, --wave and --jitter out")
+        if max(order.size) > FRAME_STRIDE:
+            raise click.UsageError(f"--size: {width}x{height} is too large for --memory sdram, which keeps pictures of "
+                                   f"up to {FRAME_STRIDE} pixels a side")
     if wave is None and (order.wave_cycles or order.wave_pixels):
         raise click.UsageError("--wave-cycles and --wave-pixel need --wave FILE")
     if wave is not None:
@@ -232,6 +243,9 @@ def _print_summary(console, name, frame):
         upload = report["upload"]
         rate = f", {upload['bytes_per_cycle']:.2g} a cycle of the last frame" if "bytes_per_cycle" in upload else ""
         parts.append(f"{upload['bytes']:,} bytes uploaded{rate}")
+    if "sdram" in report:
+        sdram = report["sdram"]
+        parts.append(f"SDRAM: {sdram['bytes']:,} bytes, data lines busy {100 * sdram['busy']:.1f} % of the time")
     if "wrong_pixels_vs_model" in report:
         parts.append(f"{report['wrong_pixels_vs_model']} pixels differ from the model")
     if "wrong_pixels_vs_golden" in report:

@@ -296,6 +296,10 @@ def test_singular_instance(tmp_path):
     (["--size", "0x384"], r"'0x384' is not WIDTHxHEIGHT"),
     (["--size", "300x200", "--chip", "coord_width=8"], r"--size: 300x200 is too large for a chip with coord_width = 8, "
      r"which draws up to 255 pixels a side"),
+    (["--memory", "sdram", "--engine", "model"], r"--memory sdram works with --engine rtl only, not model"),
+    (["--memory", "sdram", "--jitter", "3"], r"--memory sdram: leave --frames, --wave and --jitter out"),
+    (["--memory", "sdram", "--size", "1025x8"], r"--size: 1025x8 is too large for --memory sdram, which keeps pictures "
+     r"of up to 1024 pixels a side"),
     (["--format", "7-16"], r"Float format must be written EXPONENT\.FRACTION in bits, like 7\.16, not '7-16'"),
     (["--format", "9.16"], r"Exponent width must be between 2 and 8 bits, not 9"),
     (["--chip", "threads=3"], r"'threads' is not a parameter of the chip; there are .*num_threads"),
