@@ -42,11 +42,10 @@ def test_edges_that_give(number):
     image, camera = compile_scene(scene, fmt=FMT, stack_depth=config.stack_depth), scene.default_camera()
     frame = render_pysim(image, camera, *SIZE, config=config)
     assert not frame.differs(render_model(image, camera, *SIZE, config=config)).any()
-    # Triangles get larger by it, and no smaller.
+    # Edges give to each other alone: loose triangles stay what they are.
     wide, narrow = (render_model(image, camera, 64, 48, config=replace(config, edge_tolerance=tolerance))
                     for tolerance in (8, 0))
-    assert (wide.prim_id >= 0).sum() > (narrow.prim_id >= 0).sum()
-    assert (wide.prim_id >= 0)[narrow.prim_id >= 0].all()
+    assert ((wide.prim_id >= 0) == (narrow.prim_id >= 0)).all()
 
 
 def test_they_differ():

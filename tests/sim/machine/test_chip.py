@@ -7,12 +7,15 @@ import pytest
 
 from fpu import FloatFormat
 from rtl.config import ChipConfig
+from sim.golden import render_golden
 from sim.machine import HangError, SimulationError, render_pysim, render_rtl
 from sim.machine.bench import Bench
 from sim.machine.machine import camera_words
 from sim.model import render_model
 from sim.scene import load_scene
 from sim.scene.compile import compile_scene
+from sim.stability.meshes import ball
+from sim.stability.truth import scene_of
 
 from .scenes import instances_scene, soup_scene
 
@@ -62,6 +65,17 @@ def test_instances(chip, seed):
 def test_random_triangles(seed, flatten):
     frame, _ = assert_equal(soup_scene(seed), config=CHIPS["default"], size=(64, 48), flatten=flatten, seed=seed)
     assert 0.05 < (frame.prim_id < 0).mean() < 0.95
+
+
+def test_cracks_are_closed():
+    """In few bits a ball of many triangles shows its far side through its near one; edges that give close that."""
+    scene = scene_of(ball(6, roughness=0.1, rng=np.random.default_rng(1)).corners)
+    frame, _ = assert_equal(scene, config=SIMPLE, size=(64, 48), jitter=5)
+    image, camera = compile_scene(scene, fmt=SIMPLE.fmt, stack_depth=SIMPLE.stack_depth), scene.default_camera()
+    firm = render_model(image, camera, 64, 48, config=replace(SIMPLE, edge_tolerance=0))
+    golden = render_golden(scene, camera, 64, 48)
+    leaks, closed = ((golden.prim_id >= 0) & ~(drawn.t < 1.1 * golden.t) for drawn in (firm, frame))
+    assert leaks.sum() > 5 > 2 * closed.sum()
 
 
 @pytest.mark.parametrize("size", [(1, 1), (2, 1), (17, 3), (5, 33), (16, 16)])
