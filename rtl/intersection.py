@@ -37,7 +37,7 @@ class Intersection(wiring.Component):
 
     A hit at the same distance as an earlier one does not replace it. A ray for which any hit will do has its distance
     set to 0 by a solid triangle, so that nothing is nearer from then on. With a tolerance it is keys that are compared
-    and kept for the stack, and beside each ray's the soft hit that waits for another, see
+    and kept for the stack, and beside each ray's the soft hits that wait for another, see
     :func:`~rtl.unit_triangle.unit_triangle`; while a ray has no more than that, its record is that of a hit of triangle
     number all ones, its key ∞.
 
@@ -134,8 +134,9 @@ class Intersection(wiring.Component):
                                            "solid": int(self._limited)})
         ask_at = graph.inputs["t_hit"].start - 2
         # Of each ray, what the next hit has to be nearer than.
-        best_layout = data.StructLayout({"key": self._fmt, "soft": self._fmt, "is_back": 1}) if self._tolerance else \
-            self._fmt
+        best_layout = self._fmt
+        if self._tolerance:
+            best_layout = data.StructLayout({"key": self._fmt, "front": self._fmt, "back": self._fmt})
         m.submodules.to_ask = to_ask = Delay(beside_layout, cycles=ask_at)
         m.submodules.to_end = to_end = Delay(beside_layout, cycles=latency - ask_at, registered=True)
         valid = Signal(latency + 1)
@@ -240,7 +241,8 @@ class Intersection(wiring.Component):
                              new.t.eq(self.limit.payload.t_far),
                              record_write.data.triangle.eq(~0)]
                 if self._tolerance:
-                    m.d.comb += [new_best.key.eq(new.t), new_best.soft.eq(self._fmt.const(math.inf)),
+                    infinity = self._fmt.const(math.inf)
+                    m.d.comb += [new_best.key.eq(new.t), new_best.front.eq(infinity), new_best.back.eq(infinity),
                                  record_write.en.eq(new.valid)]
             m.d.comb += self.limit.ready.eq(~kept)
             self._limit(m, test, to_ask.o, to_end.o, cycles=latency - ask_at, instances=instances,
@@ -254,11 +256,9 @@ class Intersection(wiring.Component):
         infinity = self._fmt.const(math.inf)
         m.d.comb += [
             has_hit.i.eq(asking.token.hit.bit_select(asking.ray, 1)),
-            best.key.eq(Mux(has_hit.o, stored.key, infinity)),
-            best.soft.eq(Mux(has_hit.o, stored.soft, infinity)),
-            best.is_back.eq(stored.is_back),
-            test.t_soft.eq(best.soft),
-            test.is_back.eq(best.is_back),
+            *(best[name].eq(Mux(has_hit.o, stored[name], infinity)) for name in ("key", "front", "back")),
+            test.soft_front.eq(best.front),
+            test.soft_back.eq(best.back),
         ]
         return best
 
@@ -271,8 +271,8 @@ class Intersection(wiring.Component):
             is_soft.eq(taken & found.is_soft),
             kept.eq(better | is_soft),
             new_best.key.eq(Mux(better, Mux(is_over, self._fmt.const(0.0), found.key), before.key)),
-            new_best.soft.eq(Mux(is_soft, found.t, before.soft)),
-            new_best.is_back.eq(Mux(is_soft, done.cosine.sign, before.is_back)),
+            new_best.front.eq(Mux(is_soft & ~done.cosine.sign, found.t, before.front)),
+            new_best.back.eq(Mux(is_soft & done.cosine.sign, found.t, before.back)),
         ]
         with m.If(~better):
             m.d.comb += [record_write.data.triangle.eq(~0),

@@ -4,10 +4,12 @@ from fpu import Datapath, Vector
 
 from .arithmetic import ARITHMETICS
 
-__all__ = ["MARGIN", "MAX_TOLERANCE", "edge_errors", "edge_scales", "inside_edges", "unit_triangle"]
+__all__ = ["MARGIN", "MAX_TOLERANCE", "REACH", "edge_errors", "edge_scales", "inside_edges", "unit_triangle"]
 
 #: No edge gives by more, in u and v: seen so exactly from its edge that t is lost, a triangle would reach out.
 MAX_TOLERANCE = 2.0**-4
+#: Part of t within which two soft hits are at one edge: where a ray grazes, that is how far apart rounding puts them.
+REACH = 2.0**-6
 #: Tolerances by which a hit that is inside by tolerance alone counts as farther than it is.
 MARGIN = 4
 
@@ -28,10 +30,10 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
 
     A hit by tolerance alone is soft, others are firm. Where a ray slips between two triangles, it is soft on both;
     where it passes an outline, on one, or on two of which one is seen from behind. So a soft hit is a ``hit`` if it is
-    within a ``margin`` of t_soft, the nearest soft one that was none, on a triangle seen from the same side
-    (``is_back``: against its normal); else ``is_soft`` says if it is to be that one. And where triangles overlap by
+    within :data:`REACH` of the nearest soft one that was none, of a triangle seen from the same side (``soft_front``:
+    against its normal, ``soft_back``); else ``is_soft`` says if it is to be that one. And where triangles overlap by
     their tolerance, the one that is hit firmly is the one that is there: what counts is not t but ``key``, t and of a
-    soft hit the margin more, see :meth:`~fpu.graph.Graph.raised`. ``nearer`` is key < t_hit then, the nearest so far.
+    soft hit a ``margin`` more, see :meth:`~fpu.graph.Graph.raised`. ``nearer`` is key < t_hit then, the nearest so far.
 
     Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator; if tolerant, two more,
     a few additions and comparisons of exponents, and additions of a constant to bits.
@@ -47,16 +49,13 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
         # A constant that needs no registers
         tolerance = dp.input("tolerance", delay=max(map(dp.arrival, errors)))
         inside = inside_edges(dp, u, v, [dp.power_mul(error, tolerance) for error in errors])
-        firm, later = _is_inside(dp, u, v), dp.raised(t, margin := dp.input("margin", delay=dp.arrival(t)))
+        firm, later = _is_inside(dp, u, v), dp.raised(t, dp.input("margin", delay=dp.arrival(t)))
         key = dp.select(firm, t, later)
-        t_soft, is_back = (declare(name, delay=dp.arrival(key))
-                           for declare, name in ((dp.input, "t_soft"), (dp.flag, "is_back")))
-        goes_back = dp.sign(direction.z)
-        is_first = dp.gt(t_soft, later)
-        is_pair = dp.logical_and(
-            dp.logical_not(is_first), dp.le(t, dp.raised(t_soft, margin)),
-            dp.logical_or(dp.logical_and(goes_back, is_back),
-                          dp.logical_not(dp.logical_or(goes_back, is_back))))
+        reach = dp.const(REACH)
+        front, back = (dp.input(name, delay=dp.arrival(key)) for name in ("soft_front", "soft_back"))
+        t_soft = dp.select(dp.sign(direction.z), back, front)
+        is_first = dp.gt(t_soft, dp.raised(t, reach))
+        is_pair = dp.logical_and(dp.logical_not(is_first), dp.le(t, dp.raised(t_soft, reach)))
         soft = dp.logical_and(inside, dp.logical_not(firm), is_first)
         inside = dp.logical_and(inside, dp.logical_or(firm, is_pair))
     else:

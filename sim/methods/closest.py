@@ -116,15 +116,15 @@ def near_pairs(corners, origins, directions, *, pad):
     return Pairs(starts, found)
 
 
-def _joined(fmt, ray, tested, margin):
-    """Soft hits that another before them, within the margin on the same side, makes hits; as if tested by distance."""
+def _joined(fmt, ray, tested, reach):
+    """Soft hits that another before them, within reach on the same side, makes hits; as if tested by distance."""
     joined = np.zeros(len(ray), np.bool_)
     soft = np.flatnonzero(tested.is_soft)
     order = soft[np.lexsort((tested.t[soft], tested.is_back[soft], ray[soft]))]
     one, other = order[:-1], order[1:]
     bits = fmt.encode(tested.t[order])
     joined[other] = ((ray[one] == ray[other]) & (tested.is_back[one] == tested.is_back[other])
-                     & (bits[1:] - bits[:-1] <= margin))
+                     & (bits[1:] - bits[:-1] <= reach * 2**fmt.frac_width))
     return joined
 
 
@@ -160,7 +160,7 @@ def closest_hits(method, fmt, corners, origins, directions, pairs, *, excluded=N
         tested = method.test(fmt, {name: value[of] for name, value in stored.items()},
                              {name: value[ray] for name, value in rays.items()})
         is_odd[ray[np.isnan(tested.t) | np.isnan(tested.u) | np.isnan(tested.v)]] = True
-        hit = tested.hit | _joined(fmt, ray, tested, method.margin)
+        hit = tested.hit | _joined(fmt, ray, tested, method.reach)
         ray, of, t_pair, key = ray[hit], of[hit], tested.t[hit], tested.key[hit]
         # The nearest of each ray comes last, so that it is what stays.
         order = np.lexsort((-key, ray))

@@ -38,8 +38,8 @@ class Method:
         ``result_x`` … as its ``origin`` and ``direction``, and what else it gives under ``origin_…``, ``direction_…``.
     constants : callable
         ``constants(fmt)``: inputs of the test by name that are always the same.
-    margin : int
-        Units in the last place within which two soft hits make one, see :func:`~rtl.unit_triangle.unit_triangle`.
+    reach : float
+        Part of t within which two soft hits make one, see :func:`~rtl.unit_triangle.unit_triangle`.
     needs_area : bool
         Triangles without area cannot be stored, and are left out.
     """
@@ -50,7 +50,7 @@ class Method:
     per_ray: object = None
     point_map: object = None
     constants: object = lambda fmt: {}
-    margin: int = 0
+    reach: float = 0.0
     needs_area: bool = False
 
     def store(self, fmt, corners):
@@ -97,7 +97,7 @@ class Method:
         results = test.model(**{name: given[name] for name in test.input_names})
         nothing = np.zeros(np.shape(results["hit"]), np.bool_)
         return Tested(*(results[name] for name in ("t", "u", "v", "hit")), results.get("key", results["t"]),
-                      results.get("is_soft", nothing), np.signbit(given["direction_z"]) if self.margin else nothing)
+                      results.get("is_soft", nothing), np.signbit(given["direction_z"]) if self.reach else nothing)
 
     def cost(self, fmt):
         """Operators for a test a clock, as :meth:`~fpu.Datapath.cost`; those that a ray takes once are apart."""

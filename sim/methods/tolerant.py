@@ -7,7 +7,7 @@ import numpy as np
 from fpu import Datapath
 from rtl.affine_map import affine_map
 from rtl.config import ChipConfig
-from rtl.unit_triangle import MARGIN, MAX_TOLERANCE, edge_scales, inside_edges, unit_triangle
+from rtl.unit_triangle import MARGIN, MAX_TOLERANCE, REACH, edge_scales, inside_edges, unit_triangle
 
 from .method import Method
 from .parts import outputs
@@ -88,10 +88,10 @@ def tolerant(ulp, *, bound=None, cap=MAX_TOLERANCE, name=None):
     if bound is None:
         def constants(fmt):
             unit = 2.0**-fmt.frac_width
-            return {"tolerance": ulp * unit, "margin": MARGIN * ulp * unit, "t_soft": np.inf, "is_back": False}
+            return {"tolerance": ulp * unit, "margin": MARGIN * ulp * unit, "soft_front": np.inf, "soft_back": np.inf}
 
         return Method(name or f"tolerant {ulp}", stored_matrix, _chip_test, point_map=scaled_map, needs_area=True,
-                      margin=MARGIN * ulp, constants=constants)
+                      reach=REACH, constants=constants)
 
     def test(fmt):
         return tolerant_test(fmt, ulp=ulp, bound=bound, cap=cap)

@@ -96,8 +96,8 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
     next_letter = np.zeros(2, np.int64)
     child_interval = np.empty((2, 4, 2))
 
-    # Of each ray what the next hit has to be nearer than, and the soft hit that waits for another, from which side.
-    nearest, waiting, is_back = np.full(4, np.inf), np.full(4, np.inf), np.zeros(4, np.bool_)
+    # Of each ray what the next hit has to be nearer than, and the soft hits on fronts and backs that wait for another.
+    nearest, waiting = np.full(4, np.inf), np.full((4, 2), np.inf)
     has_distance = 0
     for ray in range(4):
         owners[ray, 0] = owners[ray, 1] = -1
@@ -234,8 +234,8 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
                         arithmetic, params, matrix, direction[level, ray], False)
                     t, u, v, hit, nearer, key, is_soft = tolerant_triangle(
                         arithmetic, params, here[0], here[1], here[2], dx, dy, dz, scale[0], scale[1], scale[2],
-                        scale_x, scale_y, scale_z, tolerance, MARGIN * tolerance, waiting[ray], is_back[ray],
-                        nearest[ray], limits[ray, 0])
+                        scale_x, scale_y, scale_z, tolerance, MARGIN * tolerance, waiting[ray, 0],
+                        waiting[ray, 1], nearest[ray], limits[ray, 0])
                 else:
                     dx, dy, dz = transform(arithmetic, params, matrix, direction[level, ray], False)
                     t, u, v, hit, nearer = unit_triangle(arithmetic, params, here[0], here[1], here[2], dx, dy, dz,
@@ -244,7 +244,7 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
                 if index == excluded[ray, 0] and owner == excluded[ray, 1]:
                     continue
                 if is_soft:
-                    waiting[ray], is_back[ray] = t, math.copysign(1.0, dz) < 0
+                    waiting[ray, 1 if math.copysign(1.0, dz) < 0 else 0] = t
                 if hit and (nearer or not has_distance >> ray & 1):
                     hits[ray, 0], hits[ray, 1], hits[ray, 2], hits[ray, 3] = t, u, v, dz
                     nearest[ray] = key

@@ -8,7 +8,7 @@ import pytest
 from fpu import FloatFormat
 from rtl.affine_map import affine_map
 from rtl.arithmetic import ARITHMETICS
-from rtl.unit_triangle import MARGIN, MAX_TOLERANCE, unit_triangle
+from rtl.unit_triangle import MARGIN, MAX_TOLERANCE, REACH, unit_triangle
 
 FMT = FloatFormat(7, 16)
 COUNT = 3000
@@ -72,8 +72,9 @@ def test_edges_give_by_what_was_lost(ulp):
                          for k, axis in enumerate("xyz")} | {"tolerance": np.full(COUNT, tolerance),
                                                            "margin": np.full(COUNT, MARGIN * tolerance)}
     # One that waits is near as often as not.
-    t_soft = FMT.quantize(np.abs(t) * (1 + rng.choice([-9, -3, 0, 3, 9], COUNT) * ulp * 2.0**-16))
-    tolerant |= {"t_soft": np.where(rng.random(COUNT) < 0.3, np.inf, t_soft), "is_back": rng.random(COUNT) < 0.5}
+    for name in ("soft_front", "soft_back"):
+        t_soft = FMT.quantize(np.abs(t) * (1 + rng.choice([-1.5, -0.9, 0, 0.9, 1.5], COUNT) * REACH))
+        tolerant[name] = np.where(rng.random(COUNT) < 0.3, np.inf, t_soft)
     plain, found = unit_triangle(FMT).model(**inputs), unit_triangle(FMT, tolerant=True).model(**tolerant)
     hits = beaten = waits = 0
     for i in range(COUNT):
@@ -86,11 +87,11 @@ def test_edges_give_by_what_was_lost(ulp):
         total = float(FMT.quantize(u + v))
         inside &= total <= 1 or total < 1 + max(limits)
         is_firm, ahead = u >= 0 and v >= 0 and total <= 1, 0 < t < np.inf
-        waiting, later = float(tolerant["t_soft"][i]), raised(t, MARGIN * ulp)
-        same_side = bool(tolerant["is_back"][i]) == (math.copysign(1, direction[i, 2]) < 0)
-        pairs = waiting <= later and t <= raised(waiting, MARGIN * ulp) and same_side
+        waiting = float(tolerant["soft_back" if math.copysign(1, direction[i, 2]) < 0 else "soft_front"][i])
+        later, reach = raised(t, MARGIN * ulp), int(REACH * 2**16)
+        pairs = waiting <= raised(t, reach) and t <= raised(waiting, reach)
         assert bool(found["hit"][i]) == (inside and ahead and (is_firm or pairs))
-        assert bool(found["is_soft"][i]) == (inside and ahead and not is_firm and waiting > later)
+        assert bool(found["is_soft"][i]) == (inside and ahead and not is_firm and waiting > raised(t, reach))
         waits += bool(found["is_soft"][i])
         hits += bool(found["hit"][i]) and not plain["hit"][i]
         # A hit by tolerance alone has to be nearer by the margin.
