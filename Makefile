@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart stability clean
+.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart bench stability clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -16,6 +16,7 @@ help:
 	@echo "make fpu-pairs    ten million pairs through every operator, against exact integers: docs/results/fpu_pairs.json"
 	@echo "make pipeline     the figures of docs/pipeline.md: full shading on the simulated chip"
 	@echo "make chart        accuracy over formats and arithmetics, for docs/accuracy.md"
+	@echo "make bench        the paper's Tables 3 and 4 beside it and beside Embree: docs/benchmarks.md and .html"
 	@echo "make stability    where ray/triangle tests fail, the chip's and others': the figures of docs/accuracy.md"
 	@echo "make mutants      faults planted in the operators, each found by a test: docs/results/mutants.json"
 
@@ -57,6 +58,10 @@ pipeline: setup
 
 chart: setup
 	$(BIN)/dynrt chart --scenes $(SCENES)
+
+# Without the folder of scenes, built-in ones stand for them.
+bench: setup
+	$(BIN)/dynrt bench $(if $(wildcard $(SCENES)),--scenes $(SCENES))
 
 stability: setup
 	$(BIN)/dynrt stability

@@ -12,6 +12,7 @@ from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedC
 
 from sim.scene.table3 import LARGE, SIZE, TABLE3
 
+from .bench_area import area_rows
 from .bench_chips import CHIPS
 from .bench_clock import built_clock
 from .bench_embree import core_clock, embree_row, embree_version, peak_flops_per_cycle
@@ -22,7 +23,7 @@ from .bench_plots import draw_plots
 from .bench_report import report_html
 from .bench_rows import efficiency_rows, operators_of_pipeline, published
 from .bench_sweeps import sweep_jobs
-from .errors import clear_errors, written_whole
+from .errors import BadInput, clear_errors, written_whole
 from .options import SIZE as SIZE_TYPE
 from .options import docs_option
 from .results import earlier_results, json_text, write_texts
@@ -31,7 +32,7 @@ __all__ = ["bench"]
 
 #: Whose scenes have textures.
 TEXTURED = ("Castle", "Office", "Quake3", "Quake3-p", "UT2003", "SunCOR")
-PARTS = ("embree", "simple", "textured", "sweeps")
+PARTS = ("embree", "simple", "textured", "sweeps", "area")
 
 
 def _key(row):
@@ -65,6 +66,18 @@ def _cpu():
             "flops_why": why, "embreex": embree_version()}
 
 
+def _known(path):
+    """What earlier runs have written, without rows of scenes and chips that there are no more."""
+    results = {"rows": [], "sweeps": [], "embree": {}} | earlier_results(path)
+    try:
+        results["rows"] = [row for row in results["rows"] if row["scene"] in TABLE3 and row["chip"] in CHIPS]
+        for row in (*results["rows"], *results["sweeps"]):
+            _key(row), row["cycles"], row["digest"]
+    except (LookupError, TypeError) as error:
+        raise BadInput(f"{path}: is not what this command writes; remove it to measure anew") from error
+    return results
+
+
 class _Results:
     """bench.json and all that is made of it."""
 
@@ -73,7 +86,7 @@ class _Results:
         # Before the long work
         filled(docs / "benchmarks.md", {})
         self.clock = built_clock(self.path.parent)
-        self.results = {"rows": [], "sweeps": [], "embree": {}} | earlier_results(self.path)
+        self.results = _known(self.path)
         self.pictures = docs / "pictures"
         self.pictures.mkdir(exist_ok=True)
 
@@ -163,5 +176,8 @@ def bench(scenes, docs, only, chips, sizes, parts, jobs, scheduler):
         with Progress(TextColumn("{task.description}"), *Progress.get_default_columns()[1:3], MofNCompleteColumn(),
                       TimeElapsedColumn(), console=console) as progress:
             _run(todo, found, progress=progress, workers=jobs, scheduler=scheduler)
+        if "area" in parts:
+            found.results["area"] = area_rows(names=chips or list(CHIPS), earlier=found.results.get("area", {}),
+                                              console=console)
         found.write()
         found.pages()

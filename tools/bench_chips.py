@@ -48,7 +48,8 @@ CHIPS = {chip.name: chip for chip in (
     BenchChip(name="paper", config=_PAPER, latency=4, memory=_SRAM, about="the paper's prototype, one pipeline"),
     BenchChip(
         name="ulx3s_85f", latency=20,
-        config=replace(_PAPER, num_pipelines=2, num_threads=32, node_lines=512, list_lines=512, matrix_lines=512),
+        config=replace(_PAPER, num_pipelines=2, num_threads=32, node_lines=512, list_lines=512, list_line_items=2,
+                       matrix_lines=512),
         memory="20 cycles to a line's first word, then a word a cycle of every memory, standing for SDRAM",
         about="as much as fits an LFE5U-85F"),
 )}

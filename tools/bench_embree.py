@@ -13,7 +13,7 @@ __all__ = ["core_clock", "embree_row", "embree_scene", "embree_version", "peak_f
 
 #: Embree as it is driven here has no instances: more triangles than this do not go into the memory of a small machine.
 MAX_TRIANGLES = 12_000_000
-_REPEATS = 3
+_REPEATS = 5
 #: Single precision operations a cycle of one core: two units that multiply and add, of so many lanes.
 _LANES = {"avx512f": 16, "fma": 8}
 _SSE_FLOPS = 8
@@ -27,7 +27,8 @@ def _embreex():
         import embreex.rtcore_scene
     except ImportError as error:
         raise BadInput("embreex, the software that is compared with, is not installed; run make setup, or pip install "
-                       "'dynrt[bench]', or leave it out with --no-embree") from error
+                       "'dynrt[bench]', or leave it out: dynrt bench --part simple --part textured --part sweeps "
+                       "--part area") from error
     return embreex
 
 
@@ -71,7 +72,7 @@ def embree_scene(scene, *, eye=None, max_triangles=None):
 
 
 def embree_row(scene, camera, size):
-    """How fast Embree is on a picture's primary rays, each alone, on one core: the best of three runs.
+    """How fast Embree is on a picture's primary rays, each alone, on one core: the best of five runs.
 
     Returns
     -------

@@ -74,7 +74,7 @@ def _on_cluster(function, jobs, scheduler):
     with client:
         futures = {client.submit(function, job, pure=False): job for job in jobs}
         try:
-            for future in distributed.as_completed(list(futures)):
+            for future in distributed.as_completed(list(futures), loop=client.loop):
                 yield futures[future], future.result()
         finally:
             client.cancel(list(futures))

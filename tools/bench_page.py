@@ -142,12 +142,25 @@ def _sweeps(results):
          for row in rows])
 
 
+def _chips(results):
+    area, table = results.get("area", {}), []
+    for name, chip in results.get("chips", {}).items():
+        part = area.get(name)
+        table.append([
+            name, chip["num_pipelines"], chip["num_threads"],
+            f"{chip['node_lines'] * chip['node_line_items']} / {chip['list_lines'] * chip['list_line_items']} / "
+            f"{chip['matrix_lines']}", f"{chip['latency']} cycles: {chip['memory']}",
+            *(f"{part[place]:,} of {part['of'][place]:,}" if part else "–" for place in ("lut", "dsp", "ebr"))])
+    return markdown_table(["chip", "pipelines", "threads of each", "cached nodes / list entries / matrices of each",
+                           "memories", "tables", "multipliers", "block RAMs"], table)
+
+
 def _reasons(results):
     return "\n".join(f"- {line}" for line in reasons(results.get("rows", []))) or "Nothing to explain."
 
 
-_PARTS = {"paper": _tables("paper"), "ulx3s_85f": _tables("ulx3s_85f"), "reasons": _reasons, "textured": _textured,
-          "embree": _embree, "sweeps": _sweeps}
+_PARTS = {"chips": _chips, "paper": _tables("paper"), "ulx3s_85f": _tables("ulx3s_85f"), "reasons": _reasons,
+          "textured": _textured, "embree": _embree, "sweeps": _sweeps}
 
 
 def filled(page, results):
