@@ -127,8 +127,8 @@ def test_what_unpacks_to_much_more_than_its_size(load):
     most = max(50 * len(data), 1 << 16)
     with pytest.raises(SceneError) as error:
         load(data, "test.ply.gz")
-    assert str(error.value).endswith(f"test.ply.gz: would unpack to more than {most:,} bytes, 50 times its size; unpack "
-                                     "it with gunzip")
+    assert str(error.value).endswith(f"test.ply.gz: would unpack to more than {most:,} bytes, 50 times its size; "
+                                     "unpack it with gunzip")
 
 
 @pytest.mark.parametrize(("data", "message"), [
