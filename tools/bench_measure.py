@@ -3,6 +3,7 @@
 import fcntl
 import hashlib
 import io
+import threading
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -88,8 +89,10 @@ class _Prepared:
         return self._golden[size]
 
 
-#: One at a time: some take gigabytes.
+# Some take gigabytes.
 _prepared = lru_cache(maxsize=1)(_Prepared)
+# A worker of a cluster may have several threads; the model uses all cores by itself.
+_one_at_a_time = threading.Lock()
 
 
 def _digest(job, config, camera, image):
@@ -131,6 +134,11 @@ def measure(job):
     SceneError, OverflowError, BuildError, SimulationError
         See :mod:`sim.scene`, :mod:`sim.model` and :mod:`sim.machine`.
     """
+    with _one_at_a_time:
+        return _measure(job)
+
+
+def _measure(job):
     config = SHADINGS[job.shading](job.config)
     ready = _prepared(job.scene, job.folder, job.shading, config.fmt, config.stack_depth)
     image, camera = ready.image, ready.loaded.camera

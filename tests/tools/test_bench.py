@@ -6,6 +6,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import distributed
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -191,6 +192,26 @@ def test_a_pixel_that_differs_is_counted(monkeypatch, drawn):
     row, picture = measure(job)
     assert row["wrong_pixels_vs_model"] == 1
     assert picture.startswith(b"\x89PNG")
+
+
+@pytest.mark.xdist_group("chip")
+def test_the_chip_itself_here_and_on_a_cluster(docs):
+    """All but the simulator's speed is the same, whoever measures."""
+    found = []
+    options = dict(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None)
+    with distributed.LocalCluster(**options) as cluster:
+        for arguments in ((), ("--scheduler", cluster.scheduler_address)):
+            (docs / "results" / "bench.json").unlink(missing_ok=True)
+            result = run(docs, "--only", "Scene6", "--chip", "paper", "--part", "simple", "--size", "32x24",
+                         "--size", "16x12", *arguments)
+            assert result.exit_code == 0, result.output
+            found.append(results_of(docs))
+    for results in found:
+        assert [row["wrong_pixels_vs_model"] for row in results["rows"]] == [0, 0]
+        assert all(row.pop("simulated_hz") > 1e3 for row in results["rows"])
+        # A packet of four rays takes a step a cycle.
+        assert all(row["cycles_per_ray"] > row["steps_per_ray"] > 1 for row in results["rows"])
+    assert found[0] == found[1]
 
 
 def test_parts_and_sizes_of_the_whole():
