@@ -169,7 +169,8 @@ def _row(job, config, ready, digest, frame, model, wrong):
         "bytes_per_ray": sum(per_port.values()), "bytes_per_ray_by_port": per_port,
         "steps_per_ray": counts["steps"] / rays, "leaves_per_ray": counts["leaves"] / rays,
         "entries_per_ray": counts["entries"] / rays, "instances_per_ray": counts["instances"] / rays,
-        "transformations_per_ray": counts["transformed_vectors"] / rays,
+        "transformations_per_ray": (counts["transformed_vectors"] + counts.get("shader_vectors", 0)) / rays,
+        "instructions_per_ray": counts.get("instructions", 0) / rays,
         "tests_per_ray": counts["triangle_tests"] / rays, "stack_entries": counts["stack_depth"],
         "wrong_pixels_vs_model": wrong, "wrong_pixels_vs_golden": int(model.differs_in_surface(golden).sum()),
         "psnr_vs_golden": psnr(frame.color, golden.color), "simulated_hz": report["simulated_hz"], "digest": digest}

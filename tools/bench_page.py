@@ -3,7 +3,7 @@
 import csv
 import io
 
-from .bench_reasons import reasons
+from .bench_reasons import reasons, textured_reasons
 from .page import filled_page, markdown_table
 
 __all__ = ["csv_text", "filled", "table_rows"]
@@ -104,7 +104,7 @@ def _tables(chip):
 def _textured(results):
     rows = table_rows(results, chip="paper", size=(512, 384), shading="textured")
     simple = {row["scene"]: row for row in table_rows(results, chip="paper", size=(512, 384))}
-    return markdown_table(
+    table = markdown_table(
         ["scene", "cycles a ray (paper)", "simple shading", "frames/s at 90 MHz (paper)",
          "busy %: traversal / list / transformation / intersection / shader", "hit %: records / texels",
          "bytes a ray: DynRTC + shading", "chip ≠ model", "PSNR against golden"],
@@ -113,6 +113,7 @@ def _textured(results):
           _beside(f"{row['fps_at_paper_clock']:.1f}", row["paper_fps"]), _percents(row["busy"].values()),
           _percents(row["hit"][name] for name in ("shading", "textures") if name in row["hit"]), _bytes(row),
           row["wrong_pixels_vs_model"], f"{row['psnr_vs_golden']:.1f} dB"] for row in rows])
+    return "\n".join([table, *(f"- {line}" for line in textured_reasons(results.get("rows", [])))])
 
 
 def _embree(results):

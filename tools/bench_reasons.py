@@ -1,6 +1,8 @@
 """Why a row takes more cycles than the paper's, by what was counted."""
 
-__all__ = ["reasons"]
+from sim.scene.table3 import SIZE
+
+__all__ = ["reasons", "textured_reasons"]
 
 _UNITS = (("traversal", "kd-steps", "steps_per_ray"), ("list", "list entries", "entries_per_ray"),
           ("transformation", "transformations", "transformations_per_ray"),
@@ -39,3 +41,25 @@ def reasons(rows):
     """
     return [_sentence(row) for row in rows if row["chip"] == "paper" and row["shading"] == "simple"
             and (row["cycles_ratio"] or 0) > 1]
+
+
+def textured_reasons(rows):
+    """A sentence for each row with textures that takes more cycles a ray than the paper, by what textures add."""
+    simple = {row["scene"]: row for row in rows if _is(row, "simple")}
+    return [_textured(row, simple[row["scene"]]) for row in rows
+            if _is(row, "textured") and row["scene"] in simple and (row["cycles_ratio"] or 0) > 1]
+
+
+def _is(row, shading):
+    return (row["chip"], row["shading"], tuple(row["size"])) == ("paper", shading, SIZE)
+
+
+def _textured(row, simple):
+    unit, part = max(row["busy"].items(), key=lambda unit: unit[1])
+    more = row["transformations_per_ray"] - simple["transformations_per_ray"]
+    return (f"{row['scene']}: {row['cycles_per_ray']:.1f} cycles a ray for {row['paper_cycles_per_ray']:.1f}. Without "
+            f"textures it is {simple['cycles_per_ray']:.1f}; the shader's program of "
+            f"{row['instructions_per_ray']:.0f} instructions a ray adds "
+            f"{row['cycles_per_ray'] - simple['cycles_per_ray']:.1f}, and {more:.1f} transformations to "
+            f"{simple['transformations_per_ray']:.1f}. No unit is what it waits for: {unit} is busiest, "
+            f"{100 * part:.0f} %; rays wait for their own instructions, one after the other.")
