@@ -25,8 +25,8 @@ def measured(*, cycles_per_ray, scene="Scene6", steps=8.0, shading="simple", chi
             "hit": {"nodes": 0.9, "lists": 0.8, "matrices": 0.7}, "bytes_per_ray": 10.0,
             "bytes_per_ray_by_port": {"nodes": 3.0, "lists": 1.0, "matrices": 2.0, "shading": 4.0},
             "steps_per_ray": steps, "leaves_per_ray": 0.25, "entries_per_ray": 1.0, "instances_per_ray": 0.0,
-            "transformations_per_ray": vectors, "instructions_per_ray": 20.0, "tests_per_ray": 3.5, "stack_entries": 7, "wrong_pixels_vs_model": 0,
-            "wrong_pixels_vs_golden": 1, "psnr_vs_golden": 50.0, "simulated_hz": 1e5, "digest": "x"}
+            "transformations_per_ray": vectors, "instructions_per_ray": 20.0, "tests_per_ray": 3.5,
+            "stack_entries": 7, "wrong_pixels_vs_model": 0, "wrong_pixels_vs_golden": 1, "psnr_vs_golden": 50.0, "simulated_hz": 1e5, "digest": "x"}
 
 
 def row(**changes):
@@ -64,8 +64,8 @@ def test_textured_reasons():
     rows = [row(cycles_per_ray=8.0), row(cycles_per_ray=20.0, shading="textured", busy=0.4, vectors=9.0)]
     assert textured_reasons(rows) == [
         "Scene6: 20.0 cycles a ray for 7.5. Without textures it is 8.0; the shader's program of 20 instructions a ray "
-        "adds 12.0, and 3.0 transformations to 6.0. No unit is what it waits for: transformation is busiest, 50 %; rays "
-        "wait for their own instructions, one after the other."]
+        "adds 12.0, and 3.0 transformations to 6.0. No unit is what it waits for: transformation is busiest, 50 %; "
+        "rays wait for their own instructions, one after the other."]
 
 
 def test_efficiency():
