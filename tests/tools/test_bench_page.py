@@ -26,7 +26,8 @@ def measured(*, cycles_per_ray, scene="Scene6", steps=8.0, shading="simple", chi
             "bytes_per_ray_by_port": {"nodes": 3.0, "lists": 1.0, "matrices": 2.0, "shading": 4.0},
             "steps_per_ray": steps, "leaves_per_ray": 0.25, "entries_per_ray": 1.0, "instances_per_ray": 0.0,
             "transformations_per_ray": vectors, "instructions_per_ray": 20.0, "tests_per_ray": 3.5,
-            "stack_entries": 7, "wrong_pixels_vs_model": 0, "wrong_pixels_vs_golden": 1, "psnr_vs_golden": 50.0, "simulated_hz": 1e5, "digest": "x"}
+            "stack_entries": 7, "wrong_pixels_vs_model": 0, "wrong_pixels_vs_golden": 1,
+            "psnr_vs_golden": 50.0, "simulated_hz": 1e5, "digest": "x"}
 
 
 def row(**changes):
