@@ -38,7 +38,7 @@ class BenchChip:
     about: str
 
 
-_SRAM = "32-bit SRAM, a bank a memory, as the paper's"
+_SRAM = "then a word a cycle: 32-bit SRAM, a bank a memory, as the paper's"
 _PAPER = ChipConfig()
 #: Textures and no more: no light, no ray but the primary ones.
 _TEXTURES = ShaderFeatures(**{**dict.fromkeys(SWITCHES, False), "textures": True, "directional_lights": True}, depth=0)
@@ -50,7 +50,7 @@ CHIPS = {chip.name: chip for chip in (
         name="ulx3s_85f", latency=20,
         config=replace(_PAPER, num_pipelines=2, num_threads=32, node_lines=512, list_lines=512, list_line_items=2,
                        matrix_lines=512),
-        memory="20 cycles to a line's first word, then a word a cycle of every memory, standing for SDRAM",
+        memory="then a word a cycle of every memory, whatever the others do; it stands for SDRAM",
         about="as much as fits an LFE5U-85F"),
 )}
 #: What each shading adds to a chip.

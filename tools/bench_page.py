@@ -89,6 +89,15 @@ def _paper_work(row, unit):
     return row["paper_cycles_per_ray"] and row["paper"]["busy"][unit] / 100 * row["paper_cycles_per_ray"]
 
 
+def _largest(results, chip):
+    """Of each scene the row of the largest picture, as the paper's Table 4 has."""
+    found = {}
+    for row in results["rows"]:
+        if (row["chip"], row["shading"]) == (chip, "simple"):
+            found[row["scene"]] = max(row, found.get(row["scene"], row), key=lambda other: other["size"])
+    return list(found.values())
+
+
 def _tables(chip):
     def make(results):
         if not results.get("rows"):
@@ -97,7 +106,10 @@ def _tables(chip):
         for size, number in (((512, 384), 3), ((1024, 768), 4)):
             rows = table_rows(results, chip=chip, size=size)
             parts.append(f"{size[0]}×{size[1]} (Table {number}):\n\n{_speed(rows)}")
-        return "\n".join([*parts, _work(rows)] + ([_counted(rows)] if chip == "paper" else []))
+        rows = _largest(results, chip)
+        sizes = " and ".join(dict.fromkeys("×".join(map(str, row["size"])) for row in rows))
+        parts += [f"Units, caches and memories, {sizes}:\n", _work(rows)] if rows else []
+        return "\n".join(parts + ([f"Work of a ray, {sizes}:\n", _counted(rows)] if chip == "paper" and rows else []))
     return make
 
 

@@ -26,11 +26,13 @@ def _sentence(row):
     bound = "is what it waits for" if part >= _BOUND else "is busiest"
     text += f" The unit of {unit} {bound}, {100 * part:.0f} % of the cycles (paper {100 * paper_part:.0f} %)"
     if ours > theirs:
-        return text + (f"; at the paper's {what} a ray and our part of cycles, it would be "
-                       f"{theirs / ours * row['cycles_per_ray']:.1f} cycles a ray.")
-    waits = ", ".join(f"{name} {100 * part:.0f} % (paper {paper})" for (name, part), paper in
-                      zip(list(row["hit"].items())[:3], row["paper"]["hit"], strict=True))
-    return text + f"; what is left is waiting for memory: hits of {waits}."
+        text += (f"; at the paper's {what} a ray and our part of cycles, it would be "
+                 f"{theirs / ours * row['cycles_per_ray']:.1f} cycles a ray")
+    if part < min(paper_part, _BOUND) or ours <= theirs:
+        waits = ", ".join(f"{name} {100 * part:.0f} % (paper {paper})" for (name, part), paper in
+                          zip(list(row["hit"].items())[:3], row["paper"]["hit"], strict=True))
+        text += f". What is left is waiting for memory: hits of {waits}"
+    return f"{text}."
 
 
 def reasons(rows):

@@ -57,7 +57,7 @@ def test_reasons():
         "for, 95 % of the cycles (paper 68 %); at the paper's kd-steps a ray and our part of cycles, it would be 6.4 "
         "cycles a ray.")
     assert second.endswith(
-        "The unit of traversal is busiest, 50 % of the cycles (paper 68 %); what is left is waiting for memory: hits "
+        "The unit of traversal is busiest, 50 % of the cycles (paper 68 %). What is left is waiting for memory: hits "
         "of nodes 90 % (paper 99), lists 80 % (paper 97), matrices 70 % (paper 99).")
 
 
