@@ -23,6 +23,7 @@ from .bench_plots import draw_plots
 from .bench_report import report_html
 from .bench_rows import efficiency_rows, operators_of_pipeline, published
 from .bench_sweeps import sweep_jobs
+from .bench_views import view_rows
 from .errors import BadInput, clear_errors, written_whole
 from .options import SIZE as SIZE_TYPE
 from .options import docs_option
@@ -32,7 +33,7 @@ __all__ = ["bench"]
 
 #: Whose scenes have textures.
 TEXTURED = ("Castle", "Office", "Quake3", "Quake3-p", "UT2003", "SunCOR")
-PARTS = ("embree", "simple", "textured", "sweeps", "area")
+PARTS = ("embree", "views", "simple", "textured", "sweeps", "area")
 
 
 def _key(row):
@@ -168,6 +169,10 @@ def bench(scenes, docs, only, chips, sizes, parts, jobs, scheduler):
                 found.results["embree"][name] = embree_row(loaded.scene, loaded.camera, SIZE)
                 console.print(f"{name}: Embree {found.results['embree'][name]['embree_mrays']:.2f} Mray/s",
                               highlight=False)
+            found.write()
+        if "views" in parts:
+            found.results["views"] = view_rows(folder, only=only, earlier=found.results.get("views", []),
+                                               console=console)
             found.write()
         todo = [("rows", job) for job in _table_jobs(folder, parts=parts, only=only, chips=chips, sizes=sizes,
                                                      earlier=found.by_key("rows"))]

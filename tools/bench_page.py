@@ -172,8 +172,16 @@ def _reasons(results):
     return "\n".join(f"- {line}" for line in reasons(results.get("rows", []))) or "Nothing to explain."
 
 
+def _views(results):
+    return markdown_table(
+        ["scene, view", "kd-steps", "leaves", "list entries", "transformations", "triangle tests", "instances entered"],
+        [[f"{row['scene']}{'' if row['real'] else ' *'}, {row['view']}",
+          *(f"{row[f'{what}_per_ray']:.2f}" for what in ("steps", "leaves", "entries", "transformations", "tests",
+                                                         "instances"))] for row in results.get("views", [])])
+
+
 _PARTS = {"chips": _chips, "paper": _tables("paper"), "ulx3s_85f": _tables("ulx3s_85f"), "reasons": _reasons,
-          "textured": _textured, "embree": _embree, "sweeps": _sweeps}
+          "views": _views, "textured": _textured, "embree": _embree, "sweeps": _sweeps}
 
 
 def filled(page, results):

@@ -67,11 +67,16 @@ class PaperRow:
 
 @dataclass(frozen=True, eq=False)
 class LoadedScene:
-    """A scene with the view it is measured in, and whether it is a real one, not a stand-in."""
+    """A scene with its views, and whether it is a real one, not a stand-in."""
 
     scene: Scene
-    camera: Camera
+    cameras: list
     is_real: bool
+
+    @property
+    def camera(self):
+        """The view that it is measured in, the first."""
+        return self.cameras[0]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +92,7 @@ class TableScene:
     load_files : callable
         From the folder to the Scene.
     view : str or None
-        In the folder's cameras.json, of which the first is taken.
+        Name of its views in the folder's cameras.json.
     source : str
         What the scene is and where a person gets it.
     stand_in : callable
@@ -108,7 +113,7 @@ class TableScene:
         return folder is not None and bool(self.files) and all((Path(folder) / file).exists() for file in self.files)
 
     def load(self, folder=None):
-        """The LoadedScene: of the files, if all are in ``folder``, else the stand-in in its own view.
+        """The LoadedScene: of the files, if all are in ``folder``, else the stand-in in its own views.
 
         Raises
         ------
@@ -117,13 +122,14 @@ class TableScene:
         """
         if not self.is_in(folder):
             scene = self.stand_in()
-            return LoadedScene(scene, scene.default_camera(), False)
-        return LoadedScene(self.load_files(Path(folder)), self._camera(Path(folder) / "cameras.json"), True)
+            return LoadedScene(scene, scene.cameras or [scene.default_camera()], False)
+        return LoadedScene(self.load_files(Path(folder)), self._cameras(Path(folder) / "cameras.json"), True)
 
-    def _camera(self, path):
+    def _cameras(self, path):
         try:
-            numbers = json.loads(path.read_text())[self.view][0]
-            return Camera(numbers["eye"], numbers["at"], numbers["up"], numbers["hfov_deg"])
+            views = json.loads(path.read_text())[self.view]
+            return [Camera(view["eye"], view["at"], view["up"], view["hfov_deg"])
+                    for view in (views[0], *views[1:])]
         except OSError as error:
             raise SceneError(f"{path}: {error.strerror}; it has the view '{self.view}' of {self.files[0]}") from error
         except (ValueError, LookupError, TypeError) as error:

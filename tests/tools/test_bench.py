@@ -218,3 +218,13 @@ def test_parts_and_sizes_of_the_whole():
     jobs = bench_module._table_jobs(None, parts=bench_module.PARTS, only=(), chips=(), sizes=(), earlier={})
     assert len(jobs) == 9 * 2 * 2 + 6
     assert len({job.key for job in jobs}) == len(jobs)
+
+
+def test_views(docs):
+    assert run(docs, "--only", "Scene6", "--part", "views").exit_code == 0
+    assert run(docs, "--only", "Castle", "--part", "views").exit_code == 0
+    rows = results_of(docs)["views"]
+    assert [(row["scene"], row["view"], row["real"]) for row in rows] == [("Scene6", 0, False), ("Castle", 0, False)]
+    assert all(row["steps_per_ray"] > 1 for row in rows)
+    page = (docs / "benchmarks.md").read_text()
+    assert f"| Castle *, 0 | {rows[1]['steps_per_ray']:.2f} |" in page

@@ -64,7 +64,8 @@ def test_the_first_view_is_taken(tmp_path):
     loaded = TABLE3["Scene6"].load(tmp_path)
     assert loaded.is_real
     assert loaded.scene.num_triangles == 1
-    assert loaded.camera.hfov_deg == 40
+    assert [camera.hfov_deg for camera in loaded.cameras] == [40, 41]
+    assert loaded.camera is loaded.cameras[0]
     # The other files are not there.
     assert not TABLE3["Castle"].load(tmp_path).is_real
 
@@ -72,6 +73,7 @@ def test_the_first_view_is_taken(tmp_path):
 @pytest.mark.parametrize(("cameras", "message"), [
     (None, "{path}: No such file or directory; it has the view 'scene6' of scene6_simple_room/simple_room.obj"),
     ("{}", "{path}: has no view 'scene6' with eye, at, up and hfov_deg"),
+    ('{"scene6": []}', "{path}: has no view 'scene6' with eye, at, up and hfov_deg"),
     ("[", "{path}: has no view 'scene6' with eye, at, up and hfov_deg"),
     ('{"scene6": [{"eye": [0, 0, 0]}]}', "{path}: has no view 'scene6' with eye, at, up and hfov_deg"),
 ])
