@@ -72,7 +72,7 @@ def embree_scene(scene, *, eye=None, max_triangles=None):
 
 
 def embree_row(scene, camera, size):
-    """How fast Embree is on a picture's primary rays, each alone, on one core: the best of five runs, in time of the core.
+    """How fast Embree is on a picture's primary rays, each alone, on one core: the best of five runs, in its own time.
 
     Returns
     -------
