@@ -45,16 +45,14 @@ def _order(row):
 
 
 def _table_jobs(folder, *, parts, only, chips, sizes, earlier):
-    """BenchJobs of the tables; scene by scene, as a scene is prepared once for all of its pictures."""
+    """BenchJobs of the tables; scene by scene and shading by shading, as what follows each other shares a scene."""
     jobs = []
     for scene in only or TABLE3:
-        common = dict(scene=scene, folder=folder)
-        for chip in (CHIPS[name] for name in chips or CHIPS):
-            made = dict(chip=chip.name, config=chip.config, latency=chip.latency)
-            if "simple" in parts:
-                jobs += [BenchJob(**common, **made, size=size) for size in sizes or (SIZE, LARGE)]
-            if "textured" in parts and scene in TEXTURED and chip.name == "paper":
-                jobs += [BenchJob(**common, **made, size=size, shading="textured") for size in sizes or (SIZE,)]
+        for shading, names, usual in (("simple", list(CHIPS), (SIZE, LARGE)), ("textured", ["paper"], (SIZE,))):
+            if shading in parts and (shading == "simple" or scene in TEXTURED):
+                jobs += [BenchJob(scene=scene, folder=folder, chip=name, config=CHIPS[name].config,
+                                  latency=CHIPS[name].latency, size=size, shading=shading)
+                         for name in names if not chips or name in chips for size in sizes or usual]
     return [replace(job, earlier=earlier.get(job.key)) for job in jobs]
 
 

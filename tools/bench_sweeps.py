@@ -36,4 +36,5 @@ def sweep_jobs(folder, *, only, earlier):
             if not only or scene in only:
                 job = BenchJob(scene=scene, folder=folder, chip=name, config=config, latency=latency, size=SWEEP_SIZE)
                 jobs.append((sweep, replace(job, earlier=earlier.get(job.key))))
-    return jobs
+    # A scene is read once for all chips.
+    return sorted(jobs, key=lambda found: found[1].scene)
