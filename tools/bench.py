@@ -22,7 +22,7 @@ from .bench_page import csv_text, filled
 from .bench_plots import draw_plots
 from .bench_report import report_html
 from .bench_rows import efficiency_rows, operators_of_pipeline, published
-from .bench_sweeps import sweep_jobs
+from .bench_sweeps import sweep_jobs, sweep_order
 from .bench_views import view_rows
 from .errors import BadInput, clear_errors, written_whole
 from .options import SIZE as SIZE_TYPE
@@ -108,7 +108,8 @@ class _Results:
                              **{field: str(value) if field == "fmt" else value
                                 for field, value in vars(chip.config).items()}} for name, chip in CHIPS.items()},
             "rows": sorted((published(row, clock=self.clock, embree=results["embree"]) for row in results["rows"]),
-                           key=_order)}
+                           key=_order),
+            "sweeps": sorted(results["sweeps"], key=sweep_order)}
         if "cpu" in results:
             results["efficiency"] = efficiency_rows(results["rows"], embree=results["embree"], cpu=results["cpu"],
                                                     operators=results["operators"])

@@ -5,7 +5,7 @@ from dataclasses import replace
 from .bench_chips import CHIPS
 from .bench_measure import BenchJob
 
-__all__ = ["CACHES", "PIPELINES", "SWEEP_SIZE", "THREADS", "sweep_jobs"]
+__all__ = ["CACHES", "PIPELINES", "SWEEP_SIZE", "THREADS", "sweep_jobs", "sweep_order"]
 
 SWEEP_SIZE = 256, 192
 THREADS = 1, 4, 16, 32, 64
@@ -26,6 +26,12 @@ def _chips():
         lines = {name: int(factor * getattr(paper.config, name))
                  for name in ("node_lines", "list_lines", "matrix_lines")}
         yield "caches", f"caches ×{factor:g}, latency {latency}", replace(paper.config, **lines), latency
+
+
+def sweep_order(row):
+    """Where a row of a sweep stands; of a chip that there is no more, at the end."""
+    names = [name for _, name, _, _ in _chips()]
+    return names.index(row["chip"]) if row["chip"] in names else len(names), row["scene"]
 
 
 def sweep_jobs(folder, *, only, earlier):

@@ -142,6 +142,7 @@ def test_textures_and_sweeps(docs, drawn, monkeypatch):
     assert sorted(sweeps) == sorted(f"caches ×{factor:g}, latency {latency}" for factor in (0.25, 1, 4, 16)
                                     for latency in (4, 20))
     assert all(other["sweep"] == "caches" for other in results["sweeps"])
+    assert next(iter(sweeps)) == "caches ×0.25, latency 4"
     assert (docs / "pictures" / "bench-sweeps.png").exists()
 
 
