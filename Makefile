@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart bench stability clean
+.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants damage pipeline chart bench stability clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -18,6 +18,7 @@ help:
 	@echo "make chart        accuracy over formats and arithmetics, for docs/accuracy.md"
 	@echo "make bench        the paper's Tables 3 and 4 beside it and beside Embree: docs/benchmarks.md and .html"
 	@echo "make stability    where ray/triangle tests fail, the chip's and others': the figures of docs/accuracy.md"
+	@echo "make damage       ten thousand damaged scene files of each kind, read or refused: docs/results/damage.json"
 	@echo "make mutants      faults planted in the operators, each found by a test: docs/results/mutants.json"
 
 setup: $(VENV)/.ready
@@ -52,6 +53,9 @@ fpu-pairs: setup
 
 mutants: setup
 	$(BIN)/python -m tests.mutation --output docs/results/mutants.json
+
+damage: setup
+	$(BIN)/python -m tests.sim.scene.damage --output docs/results/damage.json
 
 pipeline: setup
 	$(BIN)/dynrt pipeline

@@ -1,6 +1,6 @@
 """Damaged files of every format through their readers.
 
-    python -m tests.sim.scene.damage --count 10000
+    python -m tests.sim.scene.damage --count 10000 --output docs/results/damage.json
 """
 
 import random
@@ -18,6 +18,8 @@ import numpy as np
 
 from sim.golden.tables import lamps, looks, surfaces
 from sim.scene import SceneError, load_scene
+
+from tools.results import earlier_results, json_text, write_texts
 
 from .damage_files import FILES
 from .damage_quake import QUAKE
@@ -101,7 +103,9 @@ def try_damage(kind, count, folder):
 @click.command()
 @click.option("--count", type=click.IntRange(min=1), default=10_000, show_default=True, help="Files of each kind")
 @click.option("--only", multiple=True, type=click.Choice(list(FORMATS)), help="Only this kind")
-def main(count, only):
+@click.option("--output", type=click.Path(dir_okay=False, path_type=Path),
+              help="Where the figures go, beside those of other kinds that are there")
+def main(count, only, output):
     """Read damaged files of each kind, and say how many were read, refused, and how long the slowest took."""
     warnings.simplefilter("ignore", RuntimeWarning)
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
@@ -109,6 +113,11 @@ def main(count, only):
         for kind in only or FORMATS:
             num_read, num_refused, slowest = try_damage(kind, count, Path(folder))
             click.echo(f"{kind}: {num_read} read, {num_refused} refused, the slowest {slowest:.2f} s")
+            if output is not None:
+                kinds = earlier_results(output).get("kinds", {})
+                kinds[kind] = {"files": count, "read": num_read, "refused": num_refused,
+                               "slowest_seconds": round(slowest, 2)}
+                write_texts({output: json_text({"memory_bytes": _MEMORY, "kinds": kinds})})
 
 
 if __name__ == "__main__":
