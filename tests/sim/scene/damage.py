@@ -18,7 +18,6 @@ import numpy as np
 
 from sim.golden.tables import lamps, looks, surfaces
 from sim.scene import SceneError, load_scene
-
 from tools.results import earlier_results, json_text, write_texts
 
 from .damage_files import FILES
