@@ -22,6 +22,7 @@ from .bench_page import csv_text, filled
 from .bench_plots import draw_plots
 from .bench_report import report_html
 from .bench_rows import efficiency_rows, operators_of_pipeline, published
+from .bench_secondary import secondary_rows
 from .bench_sweeps import sweep_jobs, sweep_order
 from .bench_views import view_rows
 from .errors import BadInput, clear_errors, written_whole
@@ -104,6 +105,7 @@ class _Results:
         results = self.results
         results |= {
             "paper_size": list(SIZE), "operators": operators_of_pipeline(),
+            "secondary": secondary_rows(self.path.parent),
             "chips": {name: {"about": chip.about, "latency": chip.latency, "memory": chip.memory,
                              **{field: str(value) if field == "fmt" else value
                                 for field, value in vars(chip.config).items()}} for name, chip in CHIPS.items()},

@@ -172,6 +172,15 @@ def _reasons(results):
     return "\n".join(f"- {line}" for line in reasons(results.get("rows", []))) or "Nothing to explain."
 
 
+def _secondary(results):
+    rows = results.get("secondary", [])
+    kinds = list(rows[0]["rays_by_kind"]) if rows else []
+    return markdown_table(
+        ["demo", "size", *(f"{kind} rays" for kind in kinds), "cycles a ray", "chip ≠ model"],
+        [[row["demo"], "×".join(map(str, row["size"])), *(f"{row['rays_by_kind'][kind]:,}" for kind in kinds),
+          f"{row['cycles_per_ray']:.1f}", row["rtl_wrong_pixels"]] for row in rows])
+
+
 def _views(results):
     return markdown_table(
         ["scene, view", "kd-steps", "leaves", "list entries", "transformations", "triangle tests", "instances entered"],
@@ -181,7 +190,7 @@ def _views(results):
 
 
 _PARTS = {"chips": _chips, "paper": _tables("paper"), "ulx3s_85f": _tables("ulx3s_85f"), "reasons": _reasons,
-          "views": _views, "textured": _textured, "embree": _embree, "sweeps": _sweeps}
+          "views": _views, "textured": _textured, "secondary": _secondary, "embree": _embree, "sweeps": _sweeps}
 
 
 def filled(page, results):

@@ -172,6 +172,15 @@ def test_what_cannot_be_used(docs, drawn, name, text, message):
     assert drawn == []
 
 
+def test_other_rays_are_the_pipelines(docs, drawn):
+    path = docs / "results" / "pipeline.json"
+    demo = {"demo": "vpl", "size": [32, 24], "rays": 900, "rays_by_kind": {"primary": 768, "shadow": 132},
+            "cycles_per_ray": 31.5, "rtl_wrong_pixels": 0, "formats": []}
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"demos": [demo]}))
+    assert run(docs, "--only", "Scene6", "--chip", "paper", "--part", "simple", "--size", "16x12").exit_code == 0
+    assert "| vpl | 32×24 | 768 | 132 | 31.5 | 0 |" in (docs / "benchmarks.md").read_text()
+
+
 def test_a_board_that_is_built_has_the_clock(docs, drawn):
     (docs / "results" / "ulx3s_85f.json").write_text(json.dumps({"seeds": [
         {"seed": 1, "fmax_mhz": 105.0}, {"seed": 2, "fmax_mhz": 101.5}]}))
