@@ -22,7 +22,7 @@ def measured(*, cycles_per_ray, scene="Scene6", steps=8.0, shading="simple", chi
             "size": [512, 384], "threads": 64, "pipelines": 1, "latency": 4, "flattened": True,
             "cycles": int(cycles_per_ray * 512 * 384), "cycles_per_ray": cycles_per_ray,
             "busy": {"traversal": busy, "list": 0.1, "transformation": 0.5, "intersection": 0.25},
-            "hit": {"nodes": 0.9, "lists": 0.8, "matrices": 0.7}, "bytes_per_ray": 10.0,
+            "hit": {"nodes": 0.9, "lists": 0.8, "matrices": 0.7, "textures": 0.07}, "bytes_per_ray": 10.0,
             "bytes_per_ray_by_port": {"nodes": 3.0, "lists": 1.0, "matrices": 2.0, "shading": 4.0},
             "steps_per_ray": steps, "leaves_per_ray": 0.25, "entries_per_ray": 1.0, "instances_per_ray": 0.0,
             "transformations_per_ray": vectors, "instructions_per_ray": 20.0, "tests_per_ray": 3.5,
@@ -65,8 +65,9 @@ def test_textured_reasons():
     rows = [row(cycles_per_ray=8.0), row(cycles_per_ray=20.0, shading="textured", busy=0.4, vectors=9.0)]
     assert textured_reasons(rows) == [
         "Scene6: 20.0 cycles a ray for 7.5. Without textures it is 8.0; the shader's program of 20 instructions a ray "
-        "adds 12.0, and 3.0 transformations to 6.0. No unit is what it waits for: transformation is busiest, 50 %; "
-        "rays wait for their own instructions, one after the other."]
+        "adds 12.0, and 3.0 transformations to 6.0. No unit is what it waits for: transformation is busiest, 50 %. "
+        "What is left are latencies: of memory, as 7 % of the texels' lines hit, and of instructions, of which a ray "
+        "has one under way at a time."]
 
 
 def test_efficiency():
