@@ -64,5 +64,5 @@ def _textured(row, simple):
             f"{row['instructions_per_ray']:.0f} instructions a ray adds "
             f"{row['cycles_per_ray'] - simple['cycles_per_ray']:.1f}, and {more:.1f} transformations to "
             f"{simple['transformations_per_ray']:.1f}. No unit is what it waits for: {unit} is busiest, "
-            f"{100 * part:.0f} %. What is left are latencies: of memory, as {100 * row['hit']['textures']:.0f} % of the "
-            "texels' lines hit, and of instructions, of which a ray has one under way at a time.")
+            f"{100 * part:.0f} %. What is left are latencies: of memory, as {100 * row['hit']['textures']:.0f} % of "
+            "the texels' lines hit, and of instructions, of which a ray has one under way at a time.")
