@@ -78,6 +78,12 @@ def _known(path):
     return results
 
 
+def _is_shown(row):
+    """Whether its picture stands for its scene."""
+    shading = "textured" if row["scene"] in TEXTURED else "simple"
+    return (row["chip"], tuple(row["size"]), row["shading"]) == ("paper", SIZE, shading)
+
+
 class _Results:
     """bench.json and all that is made of it."""
 
@@ -96,8 +102,8 @@ class _Results:
     def add(self, name, row, picture=None):
         """Keeps a row at once: the whole takes a while, and may be stopped."""
         self.results[name] = [other for other in self.results[name] if _key(other) != _key(row)] + [row]
-        if picture is not None and name == "rows" and row["chip"] == "paper" and tuple(row["size"]) == SIZE:
-            with written_whole(self.pictures / f"bench-{row['scene']}-{row['shading']}.png") as path:
+        if picture is not None and name == "rows" and _is_shown(row):
+            with written_whole(self.pictures / f"bench-{row['scene']}.png") as path:
                 path.write_bytes(picture)
         self.write()
 

@@ -78,11 +78,9 @@ def report_html(results, pictures):
     """
     found = []
     for row in table_rows(results, chip="paper", size=(512, 384)):
-        for shading in ("textured", "simple"):
-            path = pictures / f"bench-{row['scene']}-{shading}.png"
-            if path.exists():
-                found.append(f"<figure>{_inlined(path, size=_PICTURE)}<br>{html.escape(row['scene'])}</figure>")
-                break
+        path = pictures / f"bench-{row['scene']}.png"
+        if path.exists():
+            found.append(f"<figure>{_inlined(path, size=_PICTURE)}<br>{html.escape(row['scene'])}</figure>")
     plots = [_inlined(pictures / f"bench-{name}.png") for name in ("cycles", "sweeps")
              if (pictures / f"bench-{name}.png").exists()]
     tables = [_speed(results, chip, size) for chip in results.get("chips", {}) for size in ((512, 384), (1024, 768))]

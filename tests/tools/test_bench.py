@@ -126,7 +126,7 @@ def test_the_papers_size(docs, drawn):
     assert row["cycles_ratio"] == pytest.approx(7680 / 196608 / 7.529, abs=1e-5)
     page = (docs / "benchmarks.md").read_text()
     assert "| Scene6 * | 806 (806) | 1 (1) | 0.04 (7.5) | 0.01 | 6250.0 (60.8) | 11718.8 | 0 |" in page
-    assert (docs / "pictures" / "bench-Scene6-simple.png").exists()
+    assert (docs / "pictures" / "bench-Scene6.png").exists()
     assert "data:image/jpeg" in (docs / "benchmarks.html").read_text()
 
 
