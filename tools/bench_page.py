@@ -3,6 +3,8 @@
 import csv
 import io
 
+from sim.scene.table3 import TABLE3
+
 from .bench_reasons import reasons, textured_reasons
 from .page import filled_page, markdown_table
 
@@ -155,6 +157,14 @@ def _sweeps(results):
          for row in rows])
 
 
+def _scenes(results):
+    measured = {row["scene"]: row["real"] for row in results.get("rows", [])}
+    return markdown_table(
+        ["scene", "what it is here", "files below --scenes", "measured on"],
+        [[name, row.source, ", ".join(f"`{file}`" for file in row.files) or "–",
+          {True: "these", False: "the stand-in", None: "–"}[measured.get(name)]] for name, row in TABLE3.items()])
+
+
 def _chips(results):
     area, table = results.get("area", {}), []
     for name, chip in results.get("chips", {}).items():
@@ -189,8 +199,8 @@ def _views(results):
                                                          "instances"))] for row in results.get("views", [])])
 
 
-_PARTS = {"chips": _chips, "paper": _tables("paper"), "ulx3s_85f": _tables("ulx3s_85f"), "reasons": _reasons,
-          "views": _views, "textured": _textured, "secondary": _secondary, "embree": _embree, "sweeps": _sweeps}
+_PARTS = {"scenes": _scenes, "chips": _chips, "paper": _tables("paper"), "ulx3s_85f": _tables("ulx3s_85f"),
+          "reasons": _reasons, "views": _views, "textured": _textured, "secondary": _secondary, "embree": _embree, "sweeps": _sweeps}
 
 
 def filled(page, results):

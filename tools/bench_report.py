@@ -6,6 +6,8 @@ import io
 
 from PIL import Image
 
+from sim.scene.table3 import TABLE3
+
 from .bench_page import table_rows
 from .bench_reasons import reasons
 
@@ -66,6 +68,10 @@ def _speed(results, chip, size):
             f"{html.escape(rows[0]['clock_source'])}.</p>{table}")
 
 
+def _sources():
+    return "".join(f"<li>{html.escape(f'{name}: {row.source}.')}</li>" for name, row in TABLE3.items())
+
+
 def report_html(results, pictures):
     """The page as text.
 
@@ -91,4 +97,5 @@ def report_html(results, pictures):
             "results/bench.json, written by make bench; docs/benchmarks.md says how they are measured. A scene with * "
             f"is a stand-in.</p>{''.join(found)}<p>{plots[0] if plots else ''}</p>{''.join(tables)}"
             f"<h2>More cycles than the paper</h2><ul>{why}</ul>"
-            f"<h2>Chips of many sizes</h2><p>{plots[1] if len(plots) > 1 else ''}</p></html>\n")
+            f"<h2>Chips of many sizes</h2><p>{plots[1] if len(plots) > 1 else ''}</p>"
+            f"<h2>Scenes</h2><ul>{_sources()}</ul></html>\n")

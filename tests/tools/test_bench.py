@@ -162,7 +162,7 @@ def test_plainly_lit():
     ("pipeline.json", '{"clock": []}', "neither ulx3s_85f.json nor pipeline.json has a clock of speed grade 6; measure "
      "one with dynrt pipeline --only clock"),
     ("pipeline.json", "{", "pipeline.json: is not JSON"),
-    ("../benchmarks.md", "", "must have the lines '<!-- begin: chips -->' and '<!-- end: chips -->' once"),
+    ("../benchmarks.md", "", "must have the lines '<!-- begin: scenes -->' and '<!-- end: scenes -->' once"),
 ])
 def test_what_cannot_be_used(docs, drawn, name, text, message):
     (docs / "results" / name).write_text(text)
