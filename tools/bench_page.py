@@ -200,7 +200,8 @@ def _views(results):
 
 
 _PARTS = {"scenes": _scenes, "chips": _chips, "paper": _tables("paper"), "ulx3s_85f": _tables("ulx3s_85f"),
-          "reasons": _reasons, "views": _views, "textured": _textured, "secondary": _secondary, "embree": _embree, "sweeps": _sweeps}
+          "reasons": _reasons, "views": _views, "textured": _textured, "secondary": _secondary,
+          "embree": _embree, "sweeps": _sweeps}
 
 
 def filled(page, results):
