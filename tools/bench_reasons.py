@@ -9,6 +9,8 @@ _UNITS = (("traversal", "kd-steps", "steps_per_ray"), ("list", "list entries", "
           ("intersection", "triangle tests", "tests_per_ray"))
 #: Part of the cycles from which a unit is what a picture waits for.
 _BOUND = 0.9
+#: How many times as much work is said to be more.
+_MORE = 1.05
 
 
 def _sentence(row):
@@ -16,7 +18,7 @@ def _sentence(row):
     work = [(unit, what, row[column], row["paper"]["busy"][number] / 100 * paper_cycles)
             for number, (unit, what, column) in enumerate(_UNITS)]
     more = [f"{ours / theirs:.1f} times the {what} ({ours:.1f} for {theirs:.1f})"
-            for _, what, ours, theirs in work if ours > theirs]
+            for _, what, ours, theirs in work if ours > _MORE * theirs]
     busiest = max(range(len(_UNITS)), key=lambda number: busy[number])
     unit, what, ours, theirs = work[busiest]
     text = (f"{row['scene']}, {row['size'][0]}×{row['size'][1]}: {row['cycles_per_ray']:.1f} cycles a ray for "
