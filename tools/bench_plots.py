@@ -67,10 +67,13 @@ def _sweeps(figure, rows):
     for axes, word in ((threads, "threads"), (pipelines, "pipelines")):
         of = [row for row in rows if row["sweep"] == word]
         if of:
-            axes.set_xscale("log", base=2)
-            axes.set_yscale("log", base=2)
+            if word == "threads":
+                axes.set_xscale("log", base=2)
+                axes.set_yscale("log", base=2)
             alone = max(row["cycles_per_ray"] for row in of)
             _curve(axes, of, word, lambda row, alone=alone: alone / row["cycles_per_ray"], color=_OURS)
+            if word == "pipelines":
+                axes.set_ylim(bottom=0)
         _plain(axes, f"times as fast, over {word}")
     for axes, title in ((traffic, "bytes a ray, over cache size ×"), (cycles, "cycles a ray")):
         for (scene, latency), color, style in zip(

@@ -31,7 +31,8 @@ def _chips():
 def sweep_order(row):
     """Where a row of a sweep stands; of a chip that there is no more, at the end."""
     names = [name for _, name, _, _ in _chips()]
-    return names.index(row["chip"]) if row["chip"] in names else len(names), row["scene"]
+    number = names.index(row["chip"]) if row["chip"] in names else len(names)
+    return list(_SCENES).index(row["sweep"]) if row["sweep"] in _SCENES else len(_SCENES), row["scene"], number
 
 
 def sweep_jobs(folder, *, only, earlier):
