@@ -4,7 +4,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
 
-.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants pipeline chart stability cracks sdram clean
+.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants damage pipeline chart bench stability \
+	cracks sdram clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -16,9 +17,11 @@ help:
 	@echo "make fpu-pairs    ten million pairs through every operator, against exact integers: docs/results/fpu_pairs.json"
 	@echo "make pipeline     the figures of docs/pipeline.md: full shading on the simulated chip"
 	@echo "make chart        accuracy over formats and arithmetics, for docs/accuracy.md"
+	@echo "make bench        the paper's Tables 3 and 4 beside it and beside Embree: docs/benchmarks.md and .html"
 	@echo "make stability    where ray/triangle tests fail, the chip's and others': the figures of docs/accuracy.md"
 	@echo "make cracks       a hundred million rays at the edges of real meshes, for docs/accuracy.md"
 	@echo "make sdram        the figures of docs/memory.md: a hundred million random accesses to an SDRAM, and its speed"
+	@echo "make damage       ten thousand damaged scene files of each kind, read or refused: docs/results/damage.json"
 	@echo "make mutants      faults planted in the operators, each found by a test: docs/results/mutants.json"
 
 setup: $(VENV)/.ready
@@ -54,11 +57,18 @@ fpu-pairs: setup
 mutants: setup
 	$(BIN)/python -m tests.mutation --output docs/results/mutants.json
 
+damage: setup
+	$(BIN)/python -m tests.sim.scene.damage --output docs/results/damage.json
+
 pipeline: setup
 	$(BIN)/dynrt pipeline
 
 chart: setup
 	$(BIN)/dynrt chart --scenes $(SCENES)
+
+# Without the folder of scenes, built-in ones stand for them.
+bench: setup
+	$(BIN)/dynrt bench $(if $(wildcard $(SCENES)),--scenes $(SCENES))
 
 stability: setup
 	$(BIN)/dynrt stability

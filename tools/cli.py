@@ -3,6 +3,7 @@
 import click
 
 from .arithmetic import arithmetic
+from .bench import bench
 from .chart import chart
 from .cracks import cracks
 from .first_light import first_light
@@ -23,6 +24,7 @@ def main():
 
 
 main.add_command(arithmetic)
+main.add_command(bench)
 main.add_command(chart)
 main.add_command(cracks)
 main.add_command(first_light)

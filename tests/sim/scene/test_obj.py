@@ -163,3 +163,15 @@ def test_real_file_agrees_with_a_plain_reader(scene_file):
     expected = np.array(vertices)[np.array(faces)]
     actual = np.concatenate([mesh.vertices[mesh.triangles] for mesh in load_scene(path).meshes])
     assert (actual == expected).all()
+
+
+def test_many_continued_lines_take_no_longer_than_others(load):
+    begin = time.perf_counter()
+    scene = load(TRIANGLE + "f 1 2 " + "\\\n" * 200_000 + " 3\nf 3 2 \\\n\t1\n")
+    assert time.perf_counter() - begin < 5
+    assert corners(scene.meshes[0]) == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 0], [1, 0, 0], [0, 0, 0]]]
+
+
+def test_an_illumination_model_of_many_digits_is_none(load):
+    scene = load("mtllib a.mtl\nusemtl m\n" + TRIANGLE + "f 1 2 3\n", a_mtl=f"newmtl m\nKs 1 1 1\nillum {'9' * 5000}\n")
+    assert scene.materials[1].specular == 1

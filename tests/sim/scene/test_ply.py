@@ -119,3 +119,25 @@ def test_errors(load, data, message):
 def test_broken_gzip(load):
     with pytest.raises(SceneError, match="not a whole gzip file"):
         load(gzip.compress(GOOD)[:-9], "test.ply.gz")
+
+
+def test_what_unpacks_to_much_more_than_its_size(load):
+    """Three megabytes of zeros in three kilobytes."""
+    data = gzip.compress(GOOD + bytes(3_000_000), 9)
+    most = max(50 * len(data), 1 << 16)
+    with pytest.raises(SceneError) as error:
+        load(data, "test.ply.gz")
+    assert str(error.value).endswith(f"test.ply.gz: would unpack to more than {most:,} bytes, 50 times its size; "
+                                     "unpack it with gunzip")
+
+
+@pytest.mark.parametrize(("data", "message"), [
+    (binary_file(TRIANGLES, "<").replace(b"float y", b"float x"), "element 'vertex' has 2 properties 'x'"),
+    (binary_file(TRIANGLES, "<", length="i").replace(b"list uchar", b"list int32").replace(
+        b"\3\0\0\0\0\0\0\0", b"\xfd\xff\xff\xff\0\0\0\0"), "face 0 has a list of length -3"),
+    (GOOD.replace(b"end_header", b"element spare 99999999999999999999\nend_header"),
+     "ends within element 'spare' of 99999999999999999999; it is cut short"),
+])
+def test_damaged_headers_and_lengths(load, data, message):
+    with pytest.raises(SceneError, match=message):
+        load(data)
