@@ -31,6 +31,13 @@ class Forgetful(Board):
         return answer
 
 
+class Repeating(Board):
+    """A board that does again what it has done."""
+
+    def _execute(self, kind, words, again):
+        return super()._execute(kind, words, False)
+
+
 class Trusting(Board):
     """A board that does not look at checksums."""
 
@@ -49,7 +56,7 @@ class Trusting(Board):
         return inner.replace(b"\xdb", b"\xdb\xdd").replace(b"\xc0", b"\xdb\xdc")
 
 
-@pytest.mark.parametrize("board", [Forgetful, Trusting])
+@pytest.mark.parametrize("board", [Forgetful, Repeating, Trusting])
 def test_a_board_with_a_fault_is_found(board):
     session = Session(board(values=Session.values, **Session.shape), random.Random(5))
     with pytest.raises(AssertionError):
