@@ -66,6 +66,8 @@ class Driver:
         How often it is sent at most.
     clock : callable
         Seconds.
+    rng : random.Random, optional
+        By which sessions are told apart; the system's, if there is none.
 
     Attributes
     ----------
@@ -80,11 +82,13 @@ class Driver:
         By all commands. After the first two the link has to be opened again.
     """
 
-    def __init__(self, port, *, timeout=0.25, attempts=8, clock=time.monotonic):
+    def __init__(self, port, *, timeout=0.25, attempts=8, clock=time.monotonic,
+                 rng=None):
         self._port = port
         self._timeout = timeout
         self._attempts = attempts
         self._clock = clock
+        self._rng = secrets.SystemRandom() if rng is None else rng
         self._sequence = None
         self.sent = self.repeated = 0
         self.memory_words = self.num_registers = self.num_readable = 0
@@ -92,9 +96,9 @@ class Driver:
     def open(self):
         """Begins anew, whatever was before."""
         self._deframer = Deframer()
-        nonce = secrets.randbits(32)
+        nonce = self._rng.getrandbits(32)
         # Any number will do, as whatever comes before the answer with this nonce is not looked at.
-        sequence = secrets.randbelow(256)
+        sequence = self._rng.randrange(256)
         self._sequence = None
         words = self._exchange(Command.OPEN, sequence, [nonce], length=6, nonce=nonce)
         _, version, max_words, self.memory_words, self.num_registers, self.num_readable = words

@@ -158,6 +158,8 @@ class Session:
                 self._misfortune()
                 self._command()
         self.link.rate, self.link.dead = 0.0, False
+        while getattr(self.board, "reset_pending", False):
+            self.board.receive(b"")
         self._open()
         # At the end, all of the memory by the link itself.
         found = self.driver.read(0, _NUM_WORDS)
@@ -166,7 +168,10 @@ class Session:
     def _open(self):
         if self.driver is not None:
             self._repeated += self.driver.repeated
-        driver = Driver(self.link, clock=self.link.clock)
+            self.driver = None
+        driver = Driver(self.link, clock=self.link.clock, rng=self._rng)
+        # A reset that was to come may come behind the answer.
+        pending = getattr(self.board, "reset_pending", False)
         try:
             driver.open()
         except NoAnswer:
@@ -177,8 +182,7 @@ class Session:
         self.driver = driver
         assert (driver.memory_words, driver.num_registers) == (_NUM_WORDS, _NUM_REGISTERS)
         self._registers = list(self.board.registers)
-        # One that was to come may not have come yet.
-        self._was_reset = getattr(self.board, "reset_pending", False)
+        self._was_reset = pending
 
     def _misfortune(self):
         rng = self._rng
