@@ -10,6 +10,11 @@ from .protocol import ACKNOWLEDGED, MAX_WORDS, REFUSED, VERSION, Command, LinkCo
 
 __all__ = ["HostPort", "host_members"]
 
+#: More than from a frame's words to whether it is refused
+_CHECK_CYCLES = 4
+#: Of the numbers of what can be read, those chosen among first
+_GROUP_BITS = 4
+
 
 def host_members(*, word_width, num_registers, num_values):
     """Members of a :class:`HostPort` besides its bytes."""
@@ -89,7 +94,7 @@ class HostPort(wiring.Component):
 
         counts = Signal(data.ArrayLayout(32, len(LinkCount)))
         registers = Signal(self.registers.shape())
-        readable = Array([*registers, *counts, *self.values])
+        readable = [*registers, *counts, *self.values]
         m.d.comb += self.registers.eq(registers)
         with m.If(receiver.missed):
             m.d.sync += counts[LinkCount.MISSED].eq(counts[LinkCount.MISSED] + 1)
@@ -103,11 +108,16 @@ class HostPort(wiring.Component):
         place, left = Signal(range(MAX_PAYLOAD + 1)), Signal(range(MAX_WORDS + 1))
         number = Signal(range(self._num_readable))
         address = Signal(len(self.request.payload), reset_less=True)
+        size = 1 << _GROUP_BITS
+        groups = [Array(readable[start:start + size])[number[:_GROUP_BITS]]
+                  for start in range(0, len(readable), size)]
+        rows = [Signal(32, name=f"row{each}", reset_less=True) for each in range(len(groups))]
         value, word = Signal(32, reset_less=True), Signal(32, reset_less=True)
 
-        # Whether what a frame asks for can be done
-        is_new, refusal = Signal(), Signal(8)
-        m.d.comb += is_new.eq(frame.sequence == (sequence + 1)[:8])
+        # What a frame is, and whether what it asks for can be done
+        is_same, follows, refusal = Signal(reset_less=True), Signal(reset_less=True), Signal(8, reset_less=True)
+        m.d.sync += [is_same.eq((frame.sequence == sequence) & (frame.checksum == checksum)),
+                     follows.eq(frame.sequence == (sequence + 1)[:8])]
         self._check(m, frame, first, second, refusal)
 
         def answer(m, *, kind, length):
@@ -136,8 +146,12 @@ class HostPort(wiring.Component):
                 m.d.sync += first.eq(receiver.word)
                 m.next = "second"
             with m.State("second"):
-                m.d.sync += second.eq(receiver.word)
-                m.next = "check"
+                m.d.sync += [second.eq(receiver.word), left.eq(_CHECK_CYCLES)]
+                m.next = "judge"
+            with m.State("judge"):
+                m.d.sync += left.eq(left - 1)
+                with m.If(left == 0):
+                    m.next = "check"
             with m.State("check"):
                 # An upload's words come from the second on.
                 m.d.comb += [receiver.reading.eq(1), receiver.address.eq(1)]
@@ -155,10 +169,10 @@ class HostPort(wiring.Component):
                 with m.Elif(~opened):
                     m.d.sync += reason.eq(Reason.NOT_OPEN)
                     m.next = "refuse"
-                with m.Elif((frame.sequence == sequence) & (frame.checksum == checksum)):
+                with m.Elif(is_same):
                     m.d.sync += [counts[LinkCount.DOUBLED].eq(counts[LinkCount.DOUBLED] + 1), doubled.eq(1),
                                  reason.eq(last_reason)]
-                with m.Elif(is_new):
+                with m.Elif(follows):
                     m.d.sync += [sequence.eq(frame.sequence), checksum.eq(frame.checksum), last_reason.eq(refusal)]
                 with m.Else():
                     m.d.sync += reason.eq(Reason.SEQUENCE)
@@ -180,7 +194,7 @@ class HostPort(wiring.Component):
                             m.next = "read"
                         with m.Case(Command.SET):
                             for each, register in enumerate(registers):
-                                with m.If(~doubled & (first == each)):
+                                with m.If(~doubled & (number == each)):
                                     m.d.sync += register.eq(second)
                         with m.Case(Command.GET):
                             m.next = "get"
@@ -228,7 +242,11 @@ class HostPort(wiring.Component):
                 with m.If(sender.i.ready):
                     m.next = "fetch"
             with m.State("fetch"):
-                m.d.sync += [value.eq(readable[number]), number.eq(number + 1)]
+                # One of sixteen, and which sixteen: together too much for one cycle.
+                m.d.sync += [row.eq(each) for row, each in zip(rows, groups, strict=True)]
+                m.next = "choose"
+            with m.State("choose"):
+                m.d.sync += [value.eq(Array(rows)[number[_GROUP_BITS:]]), number.eq(number + 1)]
                 m.next = "value"
             with m.State("value"):
                 m.d.comb += [sender.i.valid.eq(1), sender.i.payload.word.eq(value), sender.i.payload.last.eq(left == 1)]
@@ -270,37 +288,48 @@ class HostPort(wiring.Component):
         return m
 
     def _check(self, m, frame, first, second, refusal):
-        """Why a new frame cannot be done, 0 if it can."""
+        """Why a new frame cannot be done, 0 if it can, four cycles after its words."""
         num_words = frame.num_words
-        # Two 32-bit words and a carry more
-        end = Signal(33)
-        m.d.comb += end.eq(first + Mux(frame.type == Command.WRITE, num_words - 1, second).as_unsigned())
-        counted = (second != 0) & (second <= MAX_WORDS)
+        writes = Signal(reset_less=True)
+        span, end = Signal(32, reset_less=True), Signal(33, reset_less=True)
+        outside, beyond, no_register, guarded = (Signal(name=name, reset_less=True)
+                                                 for name in ("outside", "beyond", "no_register", "guarded"))
+        has_none, has_one, has_two, has_data, is_count = (
+            Signal(name=name, reset_less=True) for name in ("has_none", "has_one", "has_two", "has_data", "is_count"))
+        m.d.sync += [
+            writes.eq(frame.type == Command.WRITE),
+            span.eq(Mux(writes, num_words - 1, second)),
+            end.eq(first + span),
+            outside.eq(end > self._num_words), beyond.eq(end > self._num_readable),
+            no_register.eq(first >= self.registers.shape().length), guarded.eq(first < self._num_guarded),
+            has_none.eq(num_words == 0), has_one.eq(num_words == 1), has_two.eq(num_words == 2),
+            has_data.eq(num_words >= 2), is_count.eq((second != 0) & (second <= MAX_WORDS)),
+            refusal.eq(0),
+        ]
 
-        def unless(condition, reason):
-            with m.If(~condition):
-                m.d.comb += refusal.eq(reason)
+        def refuse(condition, reason):
+            with m.If(condition):
+                m.d.sync += refusal.eq(reason)
 
         # What is said last counts.
         with m.Switch(frame.type):
             with m.Case(Command.OPEN):
-                unless(num_words == 1, Reason.LENGTH)
+                refuse(~has_one, Reason.LENGTH)
             with m.Case(Command.WRITE):
-                unless(end <= self._num_words, Reason.ADDRESS)
-                unless(num_words >= 2, Reason.LENGTH)
+                refuse(outside, Reason.ADDRESS)
+                refuse(~has_data, Reason.LENGTH)
             with m.Case(Command.READ):
-                unless(end <= self._num_words, Reason.ADDRESS)
-                unless((num_words == 2) & counted, Reason.LENGTH)
+                refuse(outside, Reason.ADDRESS)
+                refuse(~has_two | ~is_count, Reason.LENGTH)
             with m.Case(Command.SET):
-                if self._num_guarded:
-                    unless(self.ready | (first >= self._num_guarded), Reason.BUSY)
-                unless(first < self.registers.shape().length, Reason.REGISTER)
-                unless(num_words == 2, Reason.LENGTH)
+                refuse(guarded & ~self.ready, Reason.BUSY)
+                refuse(no_register, Reason.REGISTER)
+                refuse(~has_two, Reason.LENGTH)
             with m.Case(Command.GET):
-                unless(end <= self._num_readable, Reason.REGISTER)
-                unless((num_words == 2) & counted, Reason.LENGTH)
+                refuse(beyond, Reason.REGISTER)
+                refuse(~has_two | ~is_count, Reason.LENGTH)
             with m.Case(Command.START):
-                unless(self.ready, Reason.BUSY)
-                unless(num_words == 0, Reason.LENGTH)
+                refuse(~self.ready, Reason.BUSY)
+                refuse(~has_none, Reason.LENGTH)
             with m.Default():
-                m.d.comb += refusal.eq(Reason.TYPE)
+                m.d.sync += refusal.eq(Reason.TYPE)

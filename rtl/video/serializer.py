@@ -1,6 +1,6 @@
 """Ten bits a pixel as two bits a clock, for a pin with a double data rate."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -36,15 +36,16 @@ class Serializer(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         held = Signal(10 * self._num_channels, reset_less=True)
-        beat, seen, before, aligned = Signal(), Signal(), Signal(), Signal()
+        beat, seen, before = Signal(), Signal(), Signal()
+        found, aligned = Signal(), Signal()
         m.submodules.beat = FFSynchronizer(beat, seen, o_domain="shift")
         m.d.pixel += [held.eq(self.symbols), beat.eq(~beat)]
-        # ``held`` has stayed for 2 to 3 of its 5 clocks when its beat is seen; from then on only clocks are counted.
-        place, takes = Signal(range(_PAIRS)), Signal()
-        m.d.shift += [before.eq(seen), takes.eq((place == _PAIRS - 2) & aligned),
-                      place.eq(Mux(place == _PAIRS - 1, 0, place + 1))]
-        with m.If((seen != before) & ~aligned):
-            m.d.shift += [aligned.eq(1), place.eq(0)]
+        # ``held`` has stayed for 2 to 3 of its 5 clocks when its beat is seen; from then on a ring of bits counts.
+        ring, takes = Signal(_PAIRS), Signal()
+        m.d.shift += [before.eq(seen), found.eq((seen != before) & ~aligned), aligned.eq(aligned | found),
+                      ring.eq(Cat(ring[-1] | found, ring[:-1])),
+                      # Five clocks after the beat was seen: two are in ``found`` and here.
+                      takes.eq(ring[2])]
         for channel in range(self._num_channels):
             rest = Signal(10, name=f"rest{channel}", reset_less=True)
             m.d.shift += rest.eq(Mux(takes, held.word_select(channel, 10), rest >> 2))
