@@ -18,7 +18,7 @@ def sent_layout():
 class FrameSender(wiring.Component):
     """Puts words between two of END, with a checksum behind them, and escapes what would be one.
 
-    Throughput is a byte a cycle; words are taken with their last byte.
+    Throughput is a byte in two cycles; a word is taken after its last byte.
 
     Members
     -------
@@ -34,10 +34,9 @@ class FrameSender(wiring.Component):
         m.submodules.crc = crc = CRC32_ETHERNET(8).create()
         place, escapes, checks = Signal(2), Signal(), Signal()
         checksum = Signal(32, reset_less=True)
-        byte, special, sent = Signal(8), Signal(), Signal()
+        chosen, byte, special = Signal(8), Signal(8, reset_less=True), Signal(reset_less=True)
         m.d.comb += [
-            byte.eq(Mux(checks, checksum, self.i.payload.word).word_select(place, 8)),
-            special.eq((byte == END) | (byte == ESCAPE)),
+            chosen.eq(Mux(checks, checksum, self.i.payload.word).word_select(place, 8)),
             crc.data.eq(byte),
         ]
         with m.FSM():
@@ -45,28 +44,35 @@ class FrameSender(wiring.Component):
                 m.d.comb += [self.o.payload.eq(END), self.o.valid.eq(self.i.valid), crc.start.eq(1)]
                 m.d.sync += [place.eq(0), checks.eq(0), escapes.eq(0)]
                 with m.If(self.i.valid & self.o.ready):
-                    m.next = "bytes"
-            with m.State("bytes"):
+                    m.next = "choose"
+            with m.State("choose"):
+                m.d.sync += [byte.eq(chosen), special.eq((chosen == END) | (chosen == ESCAPE))]
+                with m.If(self.i.valid | checks):
+                    m.next = "byte"
+            with m.State("byte"):
                 m.d.comb += [
-                    self.o.valid.eq(self.i.valid | checks),
+                    self.o.valid.eq(1),
                     self.o.payload.eq(Mux(escapes, Mux(byte == END, ESCAPED_END, ESCAPED_ESCAPE),
                                           Mux(special, ESCAPE, byte))),
-                    sent.eq(self.o.valid & self.o.ready & (escapes | ~special)),
-                    crc.valid.eq(sent & ~checks),
                 ]
-                with m.If(self.o.valid & self.o.ready):
+                with m.If(self.o.ready):
                     m.d.sync += escapes.eq(special & ~escapes)
-                with m.If(sent):
-                    m.d.sync += place.eq(place + 1)
-                    with m.If(place == 3):
-                        m.d.comb += self.i.ready.eq(~checks)
-                        with m.If(checks):
-                            m.next = "end"
-                        with m.Elif(self.i.payload.last):
-                            m.next = "checksum"
+                    with m.If(escapes | ~special):
+                        m.d.comb += crc.valid.eq(~checks)
+                        m.d.sync += place.eq(place + 1)
+                        m.next = "choose"
+                        with m.If(place == 3):
+                            m.next = "word"
+            with m.State("word"):
+                m.d.comb += self.i.ready.eq(~checks)
+                m.next = "choose"
+                with m.If(checks):
+                    m.next = "end"
+                with m.Elif(self.i.payload.last):
+                    m.next = "checksum"
             with m.State("checksum"):
                 m.d.sync += [checks.eq(1), checksum.eq(crc.crc)]
-                m.next = "bytes"
+                m.next = "choose"
             with m.State("end"):
                 m.d.comb += [self.o.payload.eq(END), self.o.valid.eq(1)]
                 with m.If(self.o.ready):

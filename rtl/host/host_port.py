@@ -4,8 +4,9 @@ from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from ..queue import Queue
 from .frame_receiver import MAX_PAYLOAD, FrameReceiver
-from .frame_sender import FrameSender
+from .frame_sender import FrameSender, sent_layout
 from .protocol import ACKNOWLEDGED, MAX_WORDS, REFUSED, VERSION, Command, LinkCount, Reason
 
 __all__ = ["HostPort", "host_members"]
@@ -91,9 +92,15 @@ class HostPort(wiring.Component):
         m.submodules.sender = sender = FrameSender()
         wiring.connect(m, wiring.flipped(self.i), receiver.i)
         wiring.connect(m, sender.o, wiring.flipped(self.o))
+        # A register between the choice of a word and its bytes
+        m.submodules.answers = answers = Queue(sent_layout(), depth=1)
+        wiring.connect(m, answers.o, sender.i)
 
         counts = Signal(data.ArrayLayout(32, len(LinkCount)))
         registers = Signal(self.registers.shape())
+        # What enables so many flip-flops comes from one.
+        setting = Signal(len(registers))
+        m.d.sync += setting.eq(0)
         readable = [*registers, *counts, *self.values]
         m.d.comb += self.registers.eq(registers)
         with m.If(receiver.missed):
@@ -112,6 +119,9 @@ class HostPort(wiring.Component):
         groups = [Array(readable[start:start + size])[number[:_GROUP_BITS]]
                   for start in range(0, len(readable), size)]
         rows = [Signal(32, name=f"row{each}", reset_less=True) for each in range(len(groups))]
+        for each, register in enumerate(registers):
+            with m.If(setting[each]):
+                m.d.sync += register.eq(second)
         value, word = Signal(32, reset_less=True), Signal(32, reset_less=True)
 
         # What a frame is, and whether what it asks for can be done
@@ -122,10 +132,10 @@ class HostPort(wiring.Component):
 
         def answer(m, *, kind, length):
             m.d.comb += [
-                sender.i.valid.eq(1),
-                sender.i.payload.word.eq(Cat(kind, frame.sequence, Const(0, 2), Const(length, 14)
+                answers.i.valid.eq(1),
+                answers.i.payload.word.eq(Cat(kind, frame.sequence, Const(0, 2), Const(length, 14)
                                              if isinstance(length, int) else length)),
-                sender.i.payload.last.eq(length == 0),
+                answers.i.payload.last.eq(length == 0),
             ]
 
         finished = Signal()
@@ -193,9 +203,8 @@ class HostPort(wiring.Component):
                         with m.Case(Command.READ):
                             m.next = "read"
                         with m.Case(Command.SET):
-                            for each, register in enumerate(registers):
-                                with m.If(~doubled & (number == each)):
-                                    m.d.sync += register.eq(second)
+                            m.d.sync += [set_now.eq(~doubled & (number == each))
+                                         for each, set_now in enumerate(setting)]
                         with m.Case(Command.GET):
                             m.next = "get"
                         with m.Case(Command.START):
@@ -217,7 +226,7 @@ class HostPort(wiring.Component):
 
             with m.State("read"):
                 answer(m, kind=Const(Command.READ | ACKNOWLEDGED, 8), length=left)
-                with m.If(sender.i.ready):
+                with m.If(answers.i.ready):
                     m.next = "request"
             with m.State("request"):
                 m.d.comb += self.request.valid.eq(1)
@@ -229,8 +238,9 @@ class HostPort(wiring.Component):
                 with m.If(self.data.valid):
                     m.next = "word"
             with m.State("word"):
-                m.d.comb += [sender.i.valid.eq(1), sender.i.payload.word.eq(word), sender.i.payload.last.eq(left == 1)]
-                with m.If(sender.i.ready):
+                m.d.comb += [answers.i.valid.eq(1), answers.i.payload.word.eq(word),
+                             answers.i.payload.last.eq(left == 1)]
+                with m.If(answers.i.ready):
                     m.d.sync += left.eq(left - 1)
                     m.next = "request"
                     with m.If(left == 1):
@@ -239,7 +249,7 @@ class HostPort(wiring.Component):
 
             with m.State("get"):
                 answer(m, kind=Const(Command.GET | ACKNOWLEDGED, 8), length=left)
-                with m.If(sender.i.ready):
+                with m.If(answers.i.ready):
                     m.next = "fetch"
             with m.State("fetch"):
                 # One of sixteen, and which sixteen: together too much for one cycle.
@@ -249,8 +259,9 @@ class HostPort(wiring.Component):
                 m.d.sync += [value.eq(Array(rows)[number[_GROUP_BITS:]]), number.eq(number + 1)]
                 m.next = "value"
             with m.State("value"):
-                m.d.comb += [sender.i.valid.eq(1), sender.i.payload.word.eq(value), sender.i.payload.last.eq(left == 1)]
-                with m.If(sender.i.ready):
+                m.d.comb += [answers.i.valid.eq(1), answers.i.payload.word.eq(value),
+                             answers.i.payload.last.eq(left == 1)]
+                with m.If(answers.i.ready):
                     m.d.sync += left.eq(left - 1)
                     m.next = "fetch"
                     with m.If(left == 1):
@@ -260,29 +271,29 @@ class HostPort(wiring.Component):
             with m.State("open"):
                 answer(m, kind=Const(Command.OPEN | ACKNOWLEDGED, 8), length=len(opening))
                 m.d.sync += place.eq(0)
-                with m.If(sender.i.ready):
+                with m.If(answers.i.ready):
                     m.next = "opening"
             with m.State("opening"):
-                m.d.comb += [sender.i.valid.eq(1), sender.i.payload.word.eq(Array(opening)[place]),
-                             sender.i.payload.last.eq(place == len(opening) - 1)]
-                with m.If(sender.i.ready):
+                m.d.comb += [answers.i.valid.eq(1), answers.i.payload.word.eq(Array(opening)[place]),
+                             answers.i.payload.last.eq(place == len(opening) - 1)]
+                with m.If(answers.i.ready):
                     m.d.sync += place.eq(place + 1)
-                    with m.If(sender.i.payload.last):
+                    with m.If(answers.i.payload.last):
                         m.d.comb += finished.eq(1)
                         m.next = "idle"
 
             with m.State("acknowledge"):
                 answer(m, kind=frame.type | ACKNOWLEDGED, length=0)
-                with m.If(sender.i.ready):
+                with m.If(answers.i.ready):
                     m.d.comb += finished.eq(1)
                     m.next = "idle"
             with m.State("refuse"):
                 answer(m, kind=Const(REFUSED, 8), length=1)
-                with m.If(sender.i.ready):
+                with m.If(answers.i.ready):
                     m.next = "reason"
             with m.State("reason"):
-                m.d.comb += [sender.i.valid.eq(1), sender.i.payload.word.eq(reason), sender.i.payload.last.eq(1)]
-                with m.If(sender.i.ready):
+                m.d.comb += [answers.i.valid.eq(1), answers.i.payload.word.eq(reason), answers.i.payload.last.eq(1)]
+                with m.If(answers.i.ready):
                     m.d.comb += finished.eq(1)
                     m.next = "idle"
         return m
