@@ -39,7 +39,8 @@ struct Board {
     // Words taken, which become visible when ``written`` rises.
     std::vector<Write> taken, done;
     uint32_t flush_in = 0, data_in = 0, address = 0, starts = 0, errors = 0;
-    uint64_t cycles = 0;
+    uint64_t cycles = 0, written = 0;
+    uint8_t last_byte = 0xC0;
     int64_t reset_in = -1;
 
     Board(uint64_t seed, uint32_t num_words) : random{seed}, memory(num_words) {
@@ -69,13 +70,19 @@ struct Board {
         dut->eval();
         bool moves = byte || data_in || flush_in || !taken.empty();
         if (data_in) --data_in;
-        if (dut->o_valid && dut->o_ready) answer.push_back(dut->o_payload), moves = true;
+        if (dut->o_valid && dut->o_ready) {
+            // An answer begins with END behind the last one's: all that was asked for is then done.
+            if (dut->o_payload == 0xC0 && last_byte == 0xC0 && !taken.empty()) ++errors;
+            last_byte = dut->o_payload;
+            answer.push_back(dut->o_payload), moves = true;
+        }
         if (dut->write_valid && dut->write_ready) {
             uint64_t payload = dut->write_payload;
             uint32_t where = payload & ((1u << WORD_WIDTH) - 1), mask = payload >> (WORD_WIDTH + 32) & 15;
             if (where >= memory.size() || mask != 15) ++errors;
             else taken.push_back({where, uint32_t(payload >> WORD_WIDTH)});
-            flush_in = 1 + random.below(30);
+            flush_in = 1 + random.below(100);
+            ++written;
             moves = true;
         }
         if (dut->request_valid && dut->request_ready) {
@@ -92,7 +99,7 @@ struct Board {
         dut->eval();
         dut->clk = 0;
         dut->eval();
-        if (resets) data_in = 0;
+        if (resets) data_in = 0, last_byte = 0xC0;
         ++cycles;
         return moves;
     }
@@ -111,7 +118,8 @@ void board_delete(Board* board) { delete board; }
 // Bytes come with random gaps; returns how many bytes are answered, -1 if an assertion of the hardware fails.
 int64_t board_receive(Board* board, const uint8_t* bytes, uint32_t count, uint8_t* answer, uint32_t most) {
     std::vector<uint8_t> answered;
-    uint32_t gap = 1 + board->random.below(6);
+    // Never so fast that a frame is there before the last answer's end, as on a wire.
+    uint32_t gap = 3 + board->random.below(5);
     try {
         for (uint32_t place = 0; place < count;) {
             bool sends = board->random.below(gap) == 0;
@@ -150,6 +158,6 @@ uint32_t board_written(Board* board, uint32_t* pairs, uint32_t most) {
 
 void board_counts(Board* board, uint64_t* counts) {
     counts[0] = board->cycles, counts[1] = board->starts, counts[2] = board->errors;
-    counts[3] = board->reset_in >= 0;
+    counts[3] = board->reset_in >= 0, counts[4] = board->written;
 }
 }

@@ -65,7 +65,8 @@ class VerilatedBoard:
         """Bytes that it answers with, once it has done all that it does."""
         count = self._library.board_receive(self._board, bytes(received), len(received), self._answer, _MOST)
         assert count >= 0, "an assertion of the hardware fails"
-        assert not self._counts()[2], "it writes or reads what is not there, or starts while it is not ready"
+        assert not self._counts()[2], "it writes or reads what is not there, starts while it is not ready, or " \
+            "answers before words are written"
         return bytes(self._answer[:count])
 
     def reset(self):
@@ -103,11 +104,16 @@ class VerilatedBoard:
         return self._counts()[1]
 
     @property
+    def words_written(self):
+        """How many writes of a word there have been."""
+        return self._counts()[4]
+
+    @property
     def cycles(self):
         """How many there have been."""
         return self._counts()[0]
 
     def _counts(self):
-        counts = (ctypes.c_uint64 * 4)()
+        counts = (ctypes.c_uint64 * 5)()
         self._library.board_counts(self._board, counts)
         return list(counts)

@@ -4,9 +4,11 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
+from amaranth.sim import Simulator
 
 from rtl.video.display import BarScreen
 from rtl.video.mode import MODES, VGA, XGA, VideoMode
+from rtl.video.serializer import Serializer
 from sim.machine.dvi_receiver import DviError, DviReceiver
 from tests.rtl.video.screen import TINY, expected_bars, received
 
@@ -59,3 +61,31 @@ def test_a_monitor_that_sees_a_fault():
     broken = np.stack([np.delete(bits[channel], 9999) if channel == 1 else bits[channel, :-1] for channel in range(4)])
     with pytest.raises(DviError, match="green: "):
         DviReceiver(broken).frames()
+
+
+@pytest.mark.parametrize("phase", [0.05, 0.3, 0.5, 0.75, 0.95])
+def test_a_symbol_is_taken_in_the_middle_of_its_time(phase):
+    """From the pixel clock by which it comes, 2 to 3 of its 5 shift clocks."""
+    dut, times = Serializer(num_channels=1), {}
+    simulator = Simulator(dut)
+    pixel_phase, shift_phase = 20.0, 8 * phase
+    simulator.add_clock(40e-9, phase=pixel_phase * 1e-9, domain="pixel")
+    simulator.add_clock(8e-9, phase=shift_phase * 1e-9, domain="shift")
+
+    async def send(ctx):
+        for number in range(20):
+            ctx.set(dut.symbols[0], 0x3FF if number == 10 else 0)
+            await ctx.tick("pixel")
+        # It is held from the edge that ended number 10.
+        times["held"] = pixel_phase + 40 * 10
+
+    async def watch(ctx):
+        for edge in range(100):
+            _, _, pair = await ctx.tick("shift").sample(dut.pairs[0])
+            if pair == 3:
+                times.setdefault("taken", shift_phase + 8 * (edge - 1))
+
+    simulator.add_testbench(send)
+    simulator.add_testbench(watch)
+    simulator.run()
+    assert 2.0 <= (times["taken"] - times["held"]) / 8 <= 3.0
