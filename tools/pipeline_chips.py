@@ -60,6 +60,9 @@ def _chips():
         yield Chip(name=f"{base} + {_words(feature)}", beside=base,
                    config=_with(*filter(None, (needed, feature))))
     yield Chip(name=everything, beside=least, config=whole)
+    # The least shader has these.
+    yield Chip(name=f"{everything} without directional lights", beside=everything,
+               config=replace(whole, shader=replace(whole.shader, directional_lights=False)))
     yield Chip(name=f"{everything} without secondary rays", beside=everything,
                config=replace(whole, shader=replace(whole.shader, depth=0)))
     for shaders in (2, 4):

@@ -130,7 +130,7 @@ def test_other_chips_keep_their_figures(docs):
 def test_unknown_chip(docs):
     result = run(docs, "--only", "area", "--chip", "complicated")
     assert result.exit_code == 2
-    assert "Invalid value for '--chip': 'complicated' is not one of 'simple', 'least shader', " in result.text
+    assert "Invalid value for '--chip': 'complicated' is not one of 'simple', 'simple + edge tolerance', " in result.text
 
 
 def test_units_are_the_pipelines():
@@ -151,8 +151,9 @@ def test_every_feature_is_switched_alone():
                  if chip.beside and chip.config.shader and CHIPS[chip.beside].config.shader]
         alone = {frozenset(name for name in SWITCHES if getattr(one, name) != getattr(other, name))
                  for one, other in pairs}
-        assert {feature} in alone or feature == "reflection"
-    assert {"reflection", "refraction"} in alone
+        assert {feature} in alone
+    tolerances = {CHIPS[name].config.edge_tolerance for name in ("simple", "simple + edge tolerance")}
+    assert tolerances == {0, ChipConfig().edge_tolerance}
     for name, chip in CHIPS.items():
         shader = chip.config.shader
         if shader and name.startswith("least"):
