@@ -71,7 +71,8 @@ def _sources():
             continue
         found[path] = path.read_bytes()
         waiting += _imported(path)
-    code = hashlib.sha256((_ROOT / "sim" / "machine" / "bench.cpp").read_bytes())
+    code = hashlib.sha256(b"".join((_ROOT / "sim" / "machine" / name).read_bytes()
+                                   for name in ("bench.cpp", "bench.h", "common.h")))
     for path in sorted(found):
         code.update(path.name.encode() + found[path])
     return code.hexdigest()

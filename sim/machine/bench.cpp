@@ -10,7 +10,8 @@
 #include <random>
 #include <vector>
 
-#include "Vchip.h"
+#include "Vdynrtc.h"
+#include "bench.h"
 #include "verilated.h"
 #if BENCH_TRACE == 1
 #include "verilated_vcd_c.h"
@@ -21,40 +22,6 @@ using Trace = VerilatedFstC;
 #endif
 
 namespace {
-
-// A port of any width as 32-bit words.
-template <class T>
-uint32_t word(const T& port, int number) {
-    if constexpr (std::is_integral_v<T>)
-        return number < int(sizeof(T) + 3) / 4 ? uint32_t(uint64_t(port) >> 32 * number) : 0;
-    else
-        return port.at(number);
-}
-
-template <class T>
-uint32_t field(const T& port, int low, int width) {
-    int number = low / 32, shift = low % 32;
-    uint64_t pair = word(port, number);
-    if (shift + width > 32) pair |= uint64_t(word(port, number + 1)) << 32;
-    return uint32_t(pair >> shift) & uint32_t((uint64_t(1) << width) - 1);
-}
-
-template <class T>
-void assign(T& port, const uint32_t* words) {
-    if constexpr (std::is_integral_v<T>) {
-        uint64_t value = words[0];
-        if (sizeof(T) > 4) value |= uint64_t(words[1]) << 32;
-        port = T(value);
-    } else {
-        for (size_t number = 0; number < sizeof(port) / 4; ++number) port.at(number) = words[number];
-    }
-}
-
-enum Status : int32_t {
-    DONE = 0, HUNG = 1, OUT_OF_CYCLES = 2, BAD_ADDRESS = 3, BAD_PIXEL = 4, INTERRUPTED = 5, ASSERTION = 6
-};
-
-struct AssertionFailed {};
 
 // A memory that answers in order, a word a cycle, the first of a line `latency` cycles after its request; with
 // jitter both the latency and the pace are random.
@@ -89,14 +56,12 @@ struct Memory {
 
 struct Bench {
     VerilatedContext context;
-    std::unique_ptr<Vchip> chip;
+    std::unique_ptr<Vdynrtc> chip;
     Memory memories[5];
     std::mt19937 random{1};
     bool jitter = false;
     uint64_t cycle = 0;
-    uint64_t last_entry[64 * BENCH_PIPELINES] = {};
-    int32_t last_unit[64 * BENCH_PIPELINES];
-    uint64_t quiet_since = 0;
+    Watch watch;
     volatile bool interrupted = false;
 #if BENCH_TRACE
     std::unique_ptr<Trace> trace;
@@ -109,8 +74,7 @@ struct Bench {
 #if BENCH_TRACE
         context.traceEverOn(true);
 #endif
-        chip = std::make_unique<Vchip>(&context);
-        for (auto& unit : last_unit) unit = -1;
+        chip = std::make_unique<Vdynrtc>(&context);
         chip->rst = 1;
         chip->pixel_ready = 1;
         for (int number = 0; number < 2; ++number) tick();
@@ -156,34 +120,19 @@ struct Bench {
                uint32_t num_packets) {
         uint64_t end = cycle + max_cycles, first = cycle;
         uint32_t packets = 0;
-        quiet_since = cycle;
+        watch.quiet_since = cycle;
         chip->start = 1;
         tick();
         chip->start = 0;
         while (!(chip->ready)) {
             if (cycle >= end) return OUT_OF_CYCLES;
             if (interrupted) return INTERRUPTED;
-            for (int place = 0; place < BENCH_UNITS * BENCH_PIPELINES; ++place) {
-                uint32_t probe = field(chip->probe, place * (thread_width + 1), thread_width + 1);
-                if (probe & 1) {
-                    int unit = place % BENCH_UNITS, thread = 64 * (place / BENCH_UNITS) + (probe >> 1);
-                    last_unit[thread] = unit;
-                    last_entry[thread] = quiet_since = cycle;
-                    if (unit == 0 && packets < num_packets) begun[packets++] = cycle - first;
-                    if (unit == BENCH_UNITS - 1) last_unit[thread] = -1;
-                }
-            }
-            if (chip->pixel_valid && chip->pixel_ready) {
-                uint32_t x = field(chip->pixel_payload, 0, coord_width);
-                uint32_t y = field(chip->pixel_payload, coord_width, coord_width);
-                if (x >= width || y >= height) return BAD_PIXEL;
-                uint64_t place = uint64_t(y) * width + x;
-                for (uint32_t number = 0; number < pixel_words; ++number)
-                    pixels[place * pixel_words + number] = word(chip->pixel_payload, number);
-                written[place] = cycle - first;
-                quiet_since = cycle;
-            }
-            if (cycle - quiet_since > hang_cycles) return HUNG;
+            watch.threads(chip->probe, cycle, cycle - first, thread_width, begun, num_packets, packets);
+            if (chip->pixel_valid && chip->pixel_ready &&
+                !watch.pixel(chip->pixel_payload, cycle, cycle - first, coord_width, width, height, pixel_words, pixels,
+                             written))
+                return BAD_PIXEL;
+            if (cycle - watch.quiet_since > hang_cycles) return HUNG;
             bool known = true;
             known &= serve(memories[0], chip->nodes_request_payload, chip->nodes_request_valid,
                            chip->nodes_request_ready, chip->nodes_data_valid, chip->nodes_data_payload);
@@ -261,8 +210,8 @@ void bench_counters(Bench* bench, uint32_t* counters, uint32_t count) {
 }
 
 void bench_threads(Bench* bench, int32_t* unit, uint64_t* cycle) {
-    std::memcpy(unit, bench->last_unit, sizeof bench->last_unit);
-    std::memcpy(cycle, bench->last_entry, sizeof bench->last_entry);
+    std::memcpy(unit, bench->watch.last_unit, sizeof bench->watch.last_unit);
+    std::memcpy(cycle, bench->watch.last_entry, sizeof bench->watch.last_entry);
 }
 
 int32_t bench_trace(Bench* bench, const char* path, uint64_t from, uint64_t to) {

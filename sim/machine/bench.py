@@ -20,7 +20,7 @@ __all__ = ["MEMORIES", "Bench", "HangError", "SimulationError"]
 #: A chip's memories, in the order in which the bench numbers them; not every chip has the last.
 MEMORIES = ("nodes", "lists", "matrices", "shading", "textures")
 
-_HUNG, _OUT_OF_CYCLES, _BAD_ADDRESS, _BAD_PIXEL, _INTERRUPTED, _ASSERTION = range(1, 7)
+_HUNG, _OUT_OF_CYCLES, _BAD_ADDRESS, _BAD_PIXEL, _INTERRUPTED, _ASSERTION, _VIOLATION = range(1, 8)
 
 
 class SimulationError(Exception):
@@ -158,6 +158,7 @@ class Bench:
                 _BAD_ADDRESS: f"the chip reads beyond a memory in cycle {self.cycle}",
                 _BAD_PIXEL: f"the chip writes a pixel outside of the picture in cycle {self.cycle}",
                 _ASSERTION: f"an assertion of the chip fails in cycle {self.cycle}",
+                _VIOLATION: f"the SDRAM refuses: {self._violation()}",
             }[status])
         return pixels, written, begun
 
@@ -175,6 +176,10 @@ class Bench:
         finally:
             signal.signal(signal.SIGINT, before)
         return result[0]
+
+    def _violation(self):
+        """What a memory with rules of its own refused; these have none."""
+        return ""
 
     def _whereabouts(self):
         num_slots = 64 * self._config.num_pipelines

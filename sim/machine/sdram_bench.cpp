@@ -9,44 +9,11 @@
 #include <vector>
 
 #include "Vcomponent.h"
+#include "bench.h"
 #include "sdram_chip.h"
 #include "verilated.h"
 
 namespace {
-
-// A port of any width as 32-bit words.
-template <class T>
-uint32_t word(const T& port, int number) {
-    if constexpr (std::is_integral_v<T>)
-        return number < int(sizeof(T) + 3) / 4 ? uint32_t(uint64_t(port) >> 32 * number) : 0;
-    else
-        return port.at(number);
-}
-
-template <class T>
-uint32_t field(const T& port, int low, int width) {
-    int number = low / 32, shift = low % 32;
-    uint64_t pair = word(port, number);
-    if (shift + width > 32) pair |= uint64_t(word(port, number + 1)) << 32;
-    return uint32_t(pair >> shift) & uint32_t((uint64_t(1) << width) - 1);
-}
-
-template <class T>
-void assign(T& port, const uint32_t* words) {
-    if constexpr (std::is_integral_v<T>) {
-        uint64_t value = words[0];
-        if (sizeof(T) > 4) value |= uint64_t(words[1]) << 32;
-        port = T(value);
-    } else {
-        for (size_t number = 0; number < sizeof(port) / 4; ++number) port.at(number) = words[number];
-    }
-}
-
-enum Status : int32_t {
-    DONE = 0, HUNG = 1, OUT_OF_CYCLES = 2, BAD_ADDRESS = 3, BAD_PIXEL = 4, INTERRUPTED = 5, ASSERTION = 6, VIOLATION = 7
-};
-
-struct AssertionFailed {};
 
 constexpr uint32_t num_words = 1 << 23, frame_stride = 1024;
 
@@ -57,15 +24,12 @@ struct Bench {
     uint64_t words_read[5] = {};
     uint32_t next_base = 0, bases[5] = {};
     uint64_t cycle = 0;
-    uint64_t last_entry[64 * BENCH_PIPELINES] = {};
-    int32_t last_unit[64 * BENCH_PIPELINES];
-    uint64_t quiet_since = 0;
+    Watch watch;
     uint16_t dq = 0;
     volatile bool interrupted = false;
 
     Bench(int sheet, double period) : memory(sdram::datasheets[sheet], period) {
         chip = std::make_unique<Vcomponent>(&context);
-        for (auto& unit : last_unit) unit = -1;
         chip->rst = 1;
         chip->pixel_ready = 1;
         for (int number = 0; number < 2; ++number) tick();
@@ -103,7 +67,7 @@ struct Bench {
                uint32_t num_packets) {
         uint64_t end = cycle + max_cycles, first = cycle;
         uint32_t packets = 0;
-        quiet_since = cycle;
+        watch.quiet_since = cycle;
         chip->start = 1;
         tick();
         chip->start = 0;
@@ -111,28 +75,13 @@ struct Bench {
             if (cycle >= end) return OUT_OF_CYCLES;
             if (interrupted) return INTERRUPTED;
             if (memory.violations) return VIOLATION;
-            for (int place = 0; place < BENCH_UNITS * BENCH_PIPELINES; ++place) {
-                uint32_t probe = field(chip->probe, place * (thread_width + 1), thread_width + 1);
-                if (probe & 1) {
-                    int unit = place % BENCH_UNITS, thread = 64 * (place / BENCH_UNITS) + (probe >> 1);
-                    last_unit[thread] = unit;
-                    last_entry[thread] = quiet_since = cycle;
-                    if (unit == 0 && packets < num_packets) begun[packets++] = cycle - first;
-                    if (unit == BENCH_UNITS - 1) last_unit[thread] = -1;
-                }
-            }
-            if (chip->pixel_valid) {
-                uint32_t x = field(chip->pixel_payload, 0, coord_width);
-                uint32_t y = field(chip->pixel_payload, coord_width, coord_width);
-                if (x >= width || y >= height) return BAD_PIXEL;
-                uint64_t place = uint64_t(y) * width + x;
-                for (uint32_t number = 0; number < pixel_words; ++number)
-                    pixels[place * pixel_words + number] = word(chip->pixel_payload, number);
-                written[place] = cycle - first;
-                quiet_since = cycle;
-            }
+            watch.threads(chip->probe, cycle, cycle - first, thread_width, begun, num_packets, packets);
+            if (chip->pixel_valid &&
+                !watch.pixel(chip->pixel_payload, cycle, cycle - first, coord_width, width, height, pixel_words, pixels,
+                             written))
+                return BAD_PIXEL;
             for (int number = 0; number < 5; ++number) words_read[number] += chip->delivered >> number & 1;
-            if (cycle - quiet_since > hang_cycles) return HUNG;
+            if (cycle - watch.quiet_since > hang_cycles) return HUNG;
             tick();
         }
         // The last words are on their way to the pins.
@@ -202,8 +151,8 @@ void bench_counters(Bench* bench, uint32_t* counters, uint32_t count) {
 }
 
 void bench_threads(Bench* bench, int32_t* unit, uint64_t* cycle) {
-    std::memcpy(unit, bench->last_unit, sizeof bench->last_unit);
-    std::memcpy(cycle, bench->last_entry, sizeof bench->last_entry);
+    std::memcpy(unit, bench->watch.last_unit, sizeof bench->watch.last_unit);
+    std::memcpy(cycle, bench->watch.last_entry, sizeof bench->watch.last_entry);
 }
 
 // The colours in the memory, as the display would show them

@@ -8,10 +8,10 @@ import numpy as np
 
 from rtl.memory_ports import memory_ports
 from rtl.memory_system import MemorySystem
-from rtl.observation import UNITS
 from rtl.sdram.timing import SLOWEST, SdramTiming
 
 from .bench import MEMORIES, Bench, SimulationError, _array
+from .build import bench_defines
 from .component_build import component_library
 from .machine import draw_frame, load_image
 
@@ -50,8 +50,7 @@ class SdramBench(Bench):
         path = component_library(
             MemorySystem(config, timing=SdramTiming(SLOWEST, clock_mhz=clock_mhz)), progress=progress,
             bench=Path(__file__).with_name("sdram_bench.cpp"),
-            defines={"BENCH_UNITS": len(UNITS), "BENCH_PIPELINES": config.num_pipelines,
-                     "BENCH_TEXTURES": int("textures" in memory_ports(config))})
+            defines=bench_defines(config))
         self._library = library = ctypes.CDLL(str(path))
         for name in ("cycle", "words_read", "sdram"):
             getattr(library, f"bench_{name}").restype = c_uint64
@@ -84,18 +83,8 @@ class SdramBench(Bench):
         """Not here."""
         raise SimulationError("waveforms are not written of a chip with an SDRAM")
 
-    def draw(self, **parameters):
-        """Draws one picture, as :meth:`~sim.machine.bench.Bench.draw` does.
-
-        Raises
-        ------
-        SimulationError
-            Also if the SDRAM refuses a command.
-        """
-        try:
-            return super().draw(**parameters)
-        except KeyError:
-            raise SimulationError(f"the SDRAM refuses: {self._library.bench_violation(self._bench).decode()}") from None
+    def _violation(self):
+        return self._library.bench_violation(self._bench).decode()
 
     @property
     def sdram(self):

@@ -8,21 +8,10 @@
 #include <vector>
 
 #include "Vcomponent.h"
+#include "common.h"
 #include "verilated.h"
 
 namespace {
-
-struct AssertionFailed {};
-
-// xorshift64*: Marsaglia's generator.
-struct Random {
-    uint64_t state;
-    uint32_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return uint32_t(state * 0x2545F4914F6CDD1D >> 32);
-    }
-    uint32_t below(uint32_t bound) { return uint32_t(uint64_t((*this)()) * bound >> 32); }
-};
 
 struct Write {
     uint32_t address, word;

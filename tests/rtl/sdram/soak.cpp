@@ -9,23 +9,11 @@
 #include <vector>
 
 #include "Vcomponent.h"
+#include "common.h"
 #include "sdram_chip.h"
 #include "verilated.h"
 
 namespace {
-
-struct AssertionFailed {};
-
-// xorshift64*: Marsaglia's generator, a few cycles a number.
-struct Random {
-    uint64_t state;
-    uint32_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return uint32_t(state * 0x2545F4914F6CDD1D >> 32);
-    }
-    uint32_t below(uint32_t bound) { return uint32_t(uint64_t((*this)()) * bound >> 32); }
-    bool chance(double probability) { return (*this)() < probability * 4294967296.0; }
-};
 
 constexpr uint32_t num_words = 1 << 23;
 

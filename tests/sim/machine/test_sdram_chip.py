@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import sim.machine
-from sim.machine.build import _compiler
+from sim.machine.library import compiler
 from sim.machine.sdram_chip import DATASHEETS, SdramChip, SdramViolation
 
 PART = "AS4C16M16SA-7"
@@ -207,7 +207,7 @@ const char* chip_message(sdram::Chip* chip) { return chip->first_violation.c_str
 def library(tmp_path_factory):
     folder = tmp_path_factory.mktemp("chip")
     (folder / "chip.cpp").write_text(_HARNESS)
-    subprocess.run([*_compiler(), "-std=c++17", "-O1", "-fPIC", "-shared", f"-I{Path(sim.machine.__file__).parent}",
+    subprocess.run([*compiler(), "-std=c++17", "-O1", "-fPIC", "-shared", f"-I{Path(sim.machine.__file__).parent}",
                     "chip.cpp", "-o", "chip.so"], cwd=folder, check=True)
     library = ctypes.CDLL(str(folder / "chip.so"))
     library.chip_new.restype = ctypes.c_void_p
