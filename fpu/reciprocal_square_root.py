@@ -16,7 +16,7 @@ from .reciprocal import check_fits_table
 from .rounding import Rounding, emulated, round_nearest
 from .table import LineTable
 
-__all__ = ["ReciprocalSquareRoot", "reciprocal_square_root"]
+__all__ = ["ReciprocalSquareRoot", "reciprocal_square_root", "root_operands"]
 
 _INDEX_WIDTH = 8
 
@@ -40,6 +40,21 @@ def _roots(frac_width):
     largest = 1 - 2.0 ** -(frac_width + 3)
     return LineTable(lambda x: np.minimum(x ** -0.5, largest), np.concatenate([significands, 2 * significands]),
                      num_lines=2 << min(frac_width, _INDEX_WIDTH), value_width=frac_width + 6)
+
+
+def root_operands(m, a):
+    """The radicand's significand, doubled where the exponent is odd; whether it is; and of the result what is known.
+
+    That is ``exp``, before the significand in (½, 1], and ``sign``, ``zero`` and ``inf``.
+    """
+    fmt = a.shape()
+    # The bias is odd: with an even stored exponent the exponent is odd, and the radicand is doubled.
+    is_doubled = ~a.exp[0]
+    radicand = Mux(is_doubled, Cat(Const(0, 1), a.frac, Const(1, 1)), Cat(a.frac, Const(1, 2)))
+    exp = carry_chain(m, "exponent", (ChainBit.CARRY, Const(1, 1), 0, 0),
+                      (ChainBit.SUBTRACT, Const(3 * fmt.bias - 1, fmt.exp_width + 2), Cat(a.exp, Const(0, 2)), 0))
+    return radicand, is_doubled, {"exp": exp[2:], "sign": a.sign & is_zero(a),
+                                  "zero": ~is_zero(a) & (a.sign | is_inf(a)), "inf": is_zero(a)}
 
 
 class ReciprocalSquareRoot(UnaryOperator):
@@ -86,18 +101,13 @@ class ReciprocalSquareRoot(UnaryOperator):
 
     def _compute(self, m, step):
         fmt, a, table = self.fmt, self.a, _roots(self.fmt.frac_width)
-        # The bias is odd: with an even stored exponent the exponent is odd, and the radicand is doubled.
-        is_doubled = ~a.exp[0]
-        radicand = Mux(is_doubled, Cat(Const(0, 1), a.frac, Const(1, 1)), Cat(a.frac, Const(1, 2)))
-        exp = carry_chain(m, "exponent", (ChainBit.CARRY, Const(1, 1), 0, 0),
-                          (ChainBit.SUBTRACT, Const(3 * fmt.bias - 1, fmt.exp_width + 2), Cat(a.exp, Const(0, 2)), 0))
+        radicand, is_doubled, known = root_operands(m, a)
         s = table.look_up(m, step, "estimate", Cat(a.frac, is_doubled)[table.offset_width:],
-                          a.frac[:table.offset_width], radicand=radicand, exp=exp[2:],
-                          sign=a.sign & is_zero(a), zero=~is_zero(a) & (a.sign | is_inf(a)), inf=is_zero(a))
+                          a.frac[:table.offset_width], radicand=radicand, **known)
         # In (½, 1): the significand rounded down, and what is half a unit above.
         estimate = s.value[-fmt.sig_width:]
         half_way = Cat(Const(1, 1), estimate)
-        rest = {name: getattr(s, name) for name in ("exp", "sign", "zero", "inf")}
+        rest = {name: getattr(s, name) for name in known}
         s = multiply_exactly(m, step, "square", (half_way, half_way), estimate=estimate,
                              radicand=s.radicand, **rest)
         # From one multiplier block to the next takes all of a clock.

@@ -5,11 +5,11 @@ from types import MappingProxyType, SimpleNamespace
 from amaranth.hdl import Cat, Const, Mux
 
 from .chain import ChainBit, carry_chain
-from .operator import UnaryOperator, is_inf, is_zero
+from .operator import UnaryOperator
 from .packing import round_and_pack, round_and_pack_delays
 from .pipeline import carry_delay, digit_delay, lut_delay
 from .reciprocal import MAX_FRAC_WIDTH
-from .reciprocal_square_root import ReciprocalSquareRoot, reciprocal_square_root
+from .reciprocal_square_root import ReciprocalSquareRoot, reciprocal_square_root, root_operands
 from .rounding import Rounding
 
 __all__ = ["DigitReciprocalSquareRoot", "reciprocal_square_root_for"]
@@ -56,12 +56,8 @@ class DigitReciprocalSquareRoot(UnaryOperator):
         return delays | round_and_pack_delays(fmt)
 
     def _compute(self, m, step):
-        fmt, a = self.fmt, self.a
-        # The bias is odd: with an even stored exponent the exponent is odd, and the radicand is doubled.
-        significand = Cat(a.frac, Const(1, 1))
-        radicand = Mux(a.exp[0], Cat(significand, Const(0, 1)), Cat(Const(0, 1), significand))
-        exp = carry_chain(m, "exponent", (ChainBit.CARRY, Const(1, 1), 0, 0),
-                          (ChainBit.SUBTRACT, Const(3 * fmt.bias - 1, fmt.exp_width + 2), Cat(a.exp, Const(0, 2)), 0))
+        fmt = self.fmt
+        radicand, _, known = root_operands(m, self.a)
 
         def multiple(factor):
             """Radicand times 1 + 2^factor."""
@@ -70,7 +66,7 @@ class DigitReciprocalSquareRoot(UnaryOperator):
                                                          Cat(Const(0, factor), radicand, Const(0, 1)), 0))[:width]
 
         s = step("multiples", radicand=radicand, triple=multiple(1), factor=multiple(2), ninefold=multiple(3),
-                 exp=exp[2:], sign=a.sign & is_zero(a), zero=~is_zero(a) & (a.sign | is_inf(a)), inf=is_zero(a))
+                 **known)
         # The root is more than ½: the first digit is set, and the middle of what is left ¾.
         width = len(s.ninefold) + 1
         left = carry_chain(m, "left_2", (ChainBit.CARRY, Const(1, 1), 0, 0),

@@ -65,7 +65,7 @@ def embree_scene(scene, *, eye=None, max_triangles=None):
         triangles = mesh.triangles[mesh.usable]
         if not len(triangles) or (max_triangles is not None and number + len(triangles) > max_triangles):
             continue
-        world = mesh.vertices[triangles] @ placed.transform[:, :3].T + placed.transform[:, 3]
+        world = placed.to_world(mesh.vertices[triangles])
         embreex.mesh_construction.TriangleMesh(embree, world.astype(np.float32))
         number += len(triangles)
     return embree, number

@@ -1,8 +1,6 @@
 """``dynrt chart``: what fewer bits and cheaper arithmetic do to pictures."""
 
 import csv
-import hashlib
-from pathlib import Path
 
 import click
 from rich.console import Console
@@ -15,7 +13,7 @@ from .chart_truth import Truth
 from .errors import clear_errors, written_whole
 from .options import docs_option, scenes_option
 from .real_scenes import SCENES, real_scenes
-from .results import earlier_results, json_text, write_texts
+from .results import code_version, earlier_results, json_text, write_texts
 
 __all__ = ["chart"]
 
@@ -25,18 +23,9 @@ FORMATS = ("5.8", "5.10", "6.10", "6.12", "7.12", "6.14", "7.14", "7.16", "7.18"
 VARIANTS = {**{name: {"arithmetic": NUMBERS[name], "edge_tolerance": 0}
                for name in ("separate", "fused", "truncated", "reciprocal")},
             **{f"tolerant {ulp}": {"edge_tolerance": ulp} for ulp in (2, 4, 8)}}
+#: What a picture depends on.
+_CODE = "fpu/**/*.py", "rtl/**/*.py", "sim/**/*.py", "tools/chart*.py"
 _SCENES = (*SCENES, ("sunflowers", None, None))
-_ROOT = Path(__file__).parents[1]
-
-
-def _version():
-    """Of all that a picture depends on: rows of another are measured anew."""
-    code = hashlib.sha256()
-    for folder in ("fpu", "rtl", "sim", "tools"):
-        for path in sorted((_ROOT / folder).rglob("*.py")):
-            if folder != "tools" or path.stem.startswith("chart"):
-                code.update(path.read_bytes())
-    return code.hexdigest()[:16]
 
 
 @click.command()
@@ -51,7 +40,7 @@ def chart(scenes, docs, only, formats):
     What has been measured with the same code is not measured again, so a run that was stopped goes on.
     """
     console = Console(stderr=True, highlight=False)
-    page, path, version = docs / "accuracy.md", docs / "results" / "accuracy.json", _version()
+    page, path, version = docs / "accuracy.md", docs / "results" / "accuracy.json", code_version(*_CODE)
     with clear_errors():
         # Before the long work
         filled(page, [])

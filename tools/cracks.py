@@ -1,8 +1,5 @@
 """``dynrt cracks``: rays at the edges of real meshes, by the million, through the chip's model."""
 
-import hashlib
-from pathlib import Path
-
 import click
 import numpy as np
 from rich.console import Console
@@ -12,10 +9,10 @@ from rtl.config import ChipConfig
 from sim.scene import load_scene
 from sim.stability.real import KINDS, Count, SceneEdges
 
-from .errors import clear_errors
+from .errors import BadInput, clear_errors
 from .options import FORMAT, docs_option, scenes_option
 from .page import check_places, filled_page, markdown_table
-from .results import earlier_results, json_text, write_texts
+from .results import code_version, earlier_results, json_text, write_texts
 
 __all__ = ["MESHES", "cracks"]
 
@@ -25,16 +22,9 @@ MESHES = {
     "quake3-oa_dm5": "openarena/quake3-oa_dm5.pk3", "sarge": "openarena/players.pk3:sarge",
     "gargoyle": "openarena/players.pk3:gargoyle", "conference": "conference/conference.obj"}
 _BATCH = 1 << 19
-_ROOT = Path(__file__).parents[1]
-
-
-def _version(*what):
-    """Of all that an answer depends on: rows of another are measured anew."""
-    code = hashlib.sha256(repr(what).encode())
-    for folder in ("fpu", "rtl", "sim/model", "sim/scene", "sim/stability", "sim/methods", "sim/golden"):
-        for path in sorted((_ROOT / folder).rglob("*.py")):
-            code.update(path.read_bytes())
-    return code.hexdigest()[:16]
+#: What an answer depends on.
+_CODE = tuple(f"{folder}/**/*.py" for folder in (
+    "fpu", "rtl", "sim/model", "sim/scene", "sim/stability", "sim/methods", "sim/golden"))
 
 
 def _table(results):
@@ -66,11 +56,16 @@ def cracks(scenes, docs, only, rays, fmt):
     console = Console(stderr=True, highlight=False)
     page, path = docs / "accuracy.md", docs / "results" / "cracks.json"
     share = -(-rays // (len(MESHES) * len(KINDS)))
-    version = _version(str(fmt), share)
+    version = code_version(*_CODE, what=(str(fmt), share))
     with clear_errors():
         # Before the long work
         check_places(page, PARTS)
-        known = {(row["mesh"], row["kind"]): row for row in earlier_results(path).get("rows", [])}
+        earlier = earlier_results(path)
+        if only and earlier.get("format", str(fmt)) != str(fmt):
+            raise BadInput(f"{path}: has results of format {earlier['format']}, which cannot stand beside those of "
+                           f"{fmt}; leave out --only, or name another folder with --docs")
+        known = {(row["mesh"], row["kind"]): row for row in earlier.get("rows", [])
+                 if earlier.get("format") == str(fmt)}
         chosen = [name for name in MESHES if not only or name in only]
         with Progress(TextColumn("{task.description}"), *Progress.get_default_columns()[1:3], MofNCompleteColumn(),
                       TimeElapsedColumn(), console=console) as progress:
@@ -78,7 +73,7 @@ def cracks(scenes, docs, only, rays, fmt):
             for name in chosen:
                 missing = [kind for kind in KINDS if known.get((name, kind), {}).get("version") != version]
                 progress.update(task, description=name, advance=len(KINDS) - len(missing))
-                edges = SceneEdges(load_scene(scenes / MESHES[name]), fmt=fmt) if missing else None
+                edges = _edges(scenes / MESHES[name], fmt) if missing else None
                 for kind in missing:
                     count = _count(edges, kind, share)
                     known[name, kind] = {"mesh": name, "triangles": edges.num_triangles, "edges": edges.num_edges,
@@ -94,6 +89,14 @@ def cracks(scenes, docs, only, rays, fmt):
         write_texts({page: filled_page(page, PARTS, results)})
     total = sum((Count(*(row[name] for name in Count.__dataclass_fields__)) for row in results["rows"]), Count())
     console.print(f"{total.rays:,} rays, {total.cracks:,} cracks, {total.phantoms:,} phantoms")
+
+
+def _edges(path, fmt):
+    try:
+        return SceneEdges(load_scene(path), fmt=fmt)
+    except ValueError as error:
+        raise BadInput(f"{path}: {error}, so there is nothing to aim at; take a mesh whose triangles share "
+                       "vertices") from error
 
 
 def _count(edges, kind, share):

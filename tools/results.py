@@ -1,10 +1,26 @@
 """Files of results: JSON under docs/results, read to be added to and written whole."""
 
+import hashlib
 import json
+from pathlib import Path
 
 from .errors import BadInput, written_whole
 
-__all__ = ["earlier_results", "json_text", "write_texts"]
+__all__ = ["code_version", "earlier_results", "json_text", "write_texts"]
+
+_ROOT = Path(__file__).parents[1]
+
+
+def code_version(*patterns, what=()):
+    """Of the code that a result depends on, files by pattern below the top, and of ``what`` else does.
+
+    Rows of another version are measured anew.
+    """
+    code = hashlib.sha256(repr(what).encode())
+    for pattern in patterns:
+        for path in sorted(_ROOT.glob(pattern)):
+            code.update(path.read_bytes())
+    return code.hexdigest()[:16]
 
 
 def earlier_results(path):

@@ -245,6 +245,7 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
                     continue
                 if is_soft:
                     waiting[ray, 1 if math.copysign(1.0, dz) < 0 else 0] = t
+                    has_distance |= 1 << ray
                 if hit and (nearer or not has_distance >> ray & 1):
                     hits[ray, 0], hits[ray, 1], hits[ray, 2], hits[ray, 3] = t, u, v, dz
                     nearest[ray] = key

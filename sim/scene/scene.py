@@ -93,6 +93,10 @@ class Instance:
     transform: np.ndarray
     name: str
 
+    def to_world(self, points):
+        """float64[…, 3]: where points of object space are in the world."""
+        return points @ self.transform[:, :3].T + self.transform[:, 3]
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:

@@ -7,20 +7,21 @@ from .meshes import Surface, ball, cube, ribbon, slab
 from .probe import Probe, rounded_rays
 
 __all__ = ["axis_parallel", "degenerate", "direction", "edges", "entering_excluded", "far", "far_recentred", "grazing",
-           "leaving", "leaving_excluded", "nested", "scale", "scaled_instance", "sheared_instance", "silhouettes",
-           "size", "slivers", "vertices"]
+           "leaning", "leaving", "leaving_excluded", "nested", "scale", "scaled_instance", "sheared_instance",
+           "silhouettes", "size", "slivers", "unit", "vertices"]
 
 _ROUGHNESS = 0.3
 
 
-def _unit(vectors):
+def unit(vectors):
+    """Vectors float64[…, 3] over their lengths."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def _outwards(normals, rng):
     """Unit vectors within about 60° of normals."""
     ways = normals + 0.5 * rng.normal(size=normals.shape)
-    return _unit(ways * np.sign((ways * normals).sum(axis=1, keepdims=True)))
+    return unit(ways * np.sign((ways * normals).sum(axis=1, keepdims=True)))
 
 
 def _towards(fmt, corners, targets, normals, rng, *, distance=(2.0, 4.0), **options):
@@ -30,10 +31,10 @@ def _towards(fmt, corners, targets, normals, rng, *, distance=(2.0, 4.0), **opti
     return Probe(fmt, fmt.quantize(corners), origins, directions, **options)
 
 
-def _leaning(normals, cosine, rng):
+def leaning(normals, cosine, rng):
     """Unit vectors at that cosine to unit normals."""
-    side = np.cross(normals, _unit(rng.normal(size=normals.shape)))
-    return cosine * normals + np.sqrt(1 - cosine**2) * _unit(side)
+    side = np.cross(normals, unit(rng.normal(size=normals.shape)))
+    return cosine * normals + np.sqrt(1 - cosine**2) * unit(side)
 
 
 def _ball_of(num_triangles, rng):
@@ -44,14 +45,14 @@ def edges(value, count, *, fmt, rng):
     """Points of the edges of a rough ball, from outside."""
     mesh = _ball_of(value, rng)
     targets = mesh.on_edges(count, rng)
-    return _towards(fmt, mesh.corners, targets, _unit(targets), rng)
+    return _towards(fmt, mesh.corners, targets, unit(targets), rng)
 
 
 def vertices(value, count, *, fmt, rng):
     """Vertices of a rough ball, from outside."""
     mesh = _ball_of(value, rng)
     targets = mesh.on_vertices(count, rng)
-    return _towards(fmt, mesh.corners, targets, _unit(targets), rng)
+    return _towards(fmt, mesh.corners, targets, unit(targets), rng)
 
 
 def silhouettes(value, count, *, fmt, rng):
@@ -63,7 +64,7 @@ def silhouettes(value, count, *, fmt, rng):
     while sum(map(len, targets)) < count:
         ends, sides = folds[rng.integers(len(folds), size=count)].swapaxes(0, 1)
         sides = rng.permuted(sides, axis=1)
-        way = _leaning(normals[sides[:, 0]], value, rng)
+        way = leaning(normals[sides[:, 0]], value, rng)
         fits = (way * normals[sides[:, 1]]).sum(axis=1) > value
         start, end = mesh.vertices[ends[fits]].swapaxes(0, 1)
         targets.append(start + rng.uniform(size=(len(start), 1)) * (end - start))
@@ -106,7 +107,7 @@ def size(value, count, *, fmt, rng):
     """Edges of a rough ball of radius ``value``, at a distance of about 1."""
     mesh = _ball_of(288, rng).moved(scale=value)
     targets = mesh.on_edges(count, rng)
-    return _towards(fmt, mesh.corners, targets, _unit(targets), rng, distance=(0.7, 1.4))
+    return _towards(fmt, mesh.corners, targets, unit(targets), rng, distance=(0.7, 1.4))
 
 
 def _far_mesh(value, count, rng):
@@ -118,7 +119,7 @@ def _far_mesh(value, count, rng):
 def far(value, count, *, fmt, rng):
     """Edges of a rough ball about a point that is ``value`` times its radius from the origin along x, as it is."""
     mesh, offset, targets = _far_mesh(value, count, rng)
-    origins = targets + offset + _outwards(_unit(targets), rng) * rng.uniform(2, 4, (count, 1))
+    origins = targets + offset + _outwards(unit(targets), rng) * rng.uniform(2, 4, (count, 1))
     origins, directions, _ = rounded_rays(fmt, origins, targets + offset, rng)
     return Probe(fmt, fmt.quantize(mesh.corners + offset), origins, directions)
 
@@ -128,7 +129,7 @@ def far_recentred(value, count, *, fmt, rng):
     mesh, offset, targets = _far_mesh(value, count, rng)
     corners = mesh.corners + offset
     center, factor = unit_box(corners.min(axis=(0, 1)), corners.max(axis=(0, 1)))
-    origins = targets + offset + _outwards(_unit(targets), rng) * rng.uniform(2, 4, (count, 1))
+    origins = targets + offset + _outwards(unit(targets), rng) * rng.uniform(2, 4, (count, 1))
     origins, directions, _ = rounded_rays(fmt, (origins - center) * factor, (targets + offset - center) * factor, rng)
     return Probe(fmt, fmt.quantize((corners - center) * factor), origins, directions)
 
@@ -140,7 +141,7 @@ def _placed(linear, count, fmt, rng):
     # The chip's map is the rounded one.
     world = np.linalg.inv(placement[:3])
     targets = mesh.on_edges(count, rng)
-    normals = _unit(_unit(targets) @ placement[:3])
+    normals = unit(unit(targets) @ placement[:3])
     targets = targets @ world.T
     away = rng.uniform(2, 4, (count, 1)) * np.linalg.norm(world, 2)
     origins, directions, _ = rounded_rays(fmt, targets + _outwards(normals, rng) * away, targets, rng)
@@ -182,7 +183,7 @@ def nested(value, count, *, fmt, rng):
     mesh = _ball_of(288, rng)
     targets = mesh.inside(count, rng)
     corners = np.concatenate([mesh.corners, mesh.corners * (1 - value)])
-    return _towards(fmt, corners, targets, _unit(targets), rng)
+    return _towards(fmt, corners, targets, unit(targets), rng)
 
 
 def degenerate(value, count, *, fmt, rng):
@@ -190,16 +191,16 @@ def degenerate(value, count, *, fmt, rng):
     number = 64
     starts = fmt.quantize(rng.uniform(-0.5, 0.5, (number, 3)))
     # Even in the last place, so that the middle of the edge is a member too.
-    steps = np.rint(_unit(rng.normal(size=(number, 3))) * 2.0 ** (fmt.frac_width - 4)) * 2.0 ** (5 - fmt.frac_width)
+    steps = np.rint(unit(rng.normal(size=(number, 3))) * 2.0 ** (fmt.frac_width - 4)) * 2.0 ** (5 - fmt.frac_width)
     starts = np.rint(starts * 2.0 ** (fmt.frac_width - 4)) * 2.0 ** (4 - fmt.frac_width)
-    side = _unit(np.cross(steps, rng.normal(size=(number, 3))))
+    side = unit(np.cross(steps, rng.normal(size=(number, 3))))
     length = np.linalg.norm(steps, axis=1, keepdims=True)
     corners = np.stack([starts, starts + steps, starts + steps / 2 + value * length * side], axis=1)
     corners = fmt.quantize(corners)
     chosen = rng.integers(number, size=count)
     along = starts[chosen] + rng.uniform(-0.2, 1.2, (count, 1)) * steps[chosen]
-    ways = _unit(rng.normal(size=(count, 3)))
-    past = _unit(np.cross(ways, steps[chosen])) * 10.0 ** rng.uniform(-4, -1, (count, 1))
+    ways = unit(rng.normal(size=(count, 3)))
+    past = unit(np.cross(ways, steps[chosen])) * 10.0 ** rng.uniform(-4, -1, (count, 1))
     origins, directions, _ = rounded_rays(fmt, along + ways * rng.uniform(2, 4, (count, 1)), along + past, rng)
     return Probe(fmt, corners, origins, directions, everything=True)
 
@@ -211,7 +212,7 @@ def _from_surface(cosine, count, fmt, rng, *, excludes, **options):
     own = rng.integers(len(mesh.triangles), size=count)
     weights = rng.dirichlet((1, 1, 1), count)
     points = np.einsum("ni,nij->nj", weights, mesh.corners[own])
-    ways = _leaning(mesh.normals[own], cosine, rng)
+    ways = leaning(mesh.normals[own], cosine, rng)
     return Probe(fmt, mesh.corners, fmt.quantize(points), fmt.quantize(ways * rng.uniform(0.5, 1.5, (count, 1))),
                  excluded=own if excludes else None, **options)
 
@@ -235,7 +236,7 @@ def scale(value, count, *, fmt, rng):
     """Edges of a rough ball, all lengths times ten to the power ``value``."""
     mesh, factor = _ball_of(288, rng), 10.0**value
     targets = mesh.on_edges(count, rng)
-    return _towards(fmt, mesh.corners * factor, targets * factor, _unit(targets), rng,
+    return _towards(fmt, mesh.corners * factor, targets * factor, unit(targets), rng,
                     distance=(2 * factor, 4 * factor))
 
 
@@ -243,6 +244,6 @@ def direction(value, count, *, fmt, rng):
     """Edges of a rough ball, directions times ten to the power ``value``."""
     mesh = _ball_of(288, rng)
     targets = mesh.on_edges(count, rng)
-    origins = targets + _outwards(_unit(targets), rng) * rng.uniform(2, 4, (count, 1))
+    origins = targets + _outwards(unit(targets), rng) * rng.uniform(2, 4, (count, 1))
     origins, directions, _ = rounded_rays(fmt, origins, targets, rng, stretch=(0.5 * 10.0**value, 1.5 * 10.0**value))
     return Probe(fmt, fmt.quantize(mesh.corners), origins, directions)

@@ -8,6 +8,7 @@ from ..golden.tracer import trace
 from ..scene.compile import CompiledScene
 from .chip import ChipProbe
 from .probe import Probe, rounded_rays
+from .probes import leaning, unit
 from .truth import BLUR, judge, scene_of, truth_of
 
 __all__ = ["KINDS", "Count", "SceneEdges"]
@@ -34,10 +35,6 @@ class Count:
         return Count(*(getattr(self, name) + getattr(other, name) for name in self.__dataclass_fields__))
 
 
-def _unit(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
 class SceneEdges:
     """A scene compiled to one space, and those of its edges in which two triangles meet, and no third.
 
@@ -58,9 +55,8 @@ class SceneEdges:
     """
 
     def __init__(self, scene, *, fmt):
-        corners = np.concatenate([
-            mesh.vertices[mesh.triangles[mesh.usable]] @ placed.transform[:, :3].T + placed.transform[:, 3]
-            for placed in scene.instances for mesh in [scene.meshes[placed.mesh]]])
+        corners = np.concatenate([placed.to_world(mesh.vertices[mesh.triangles[mesh.usable]])
+                                  for placed in scene.instances for mesh in [scene.meshes[placed.mesh]]])
         alone = scene_of(corners)
         compiled = CompiledScene(alone, fmt=fmt)
         self._fmt, self._image = fmt, compiled.image(alone)
@@ -117,15 +113,15 @@ class SceneEdges:
             if not len(self._fans):
                 return np.empty((0, 3)), np.empty((0, 3))
             vertex, triangle = self._fans[rng.integers(len(self._fans), size=count)].T
-            ways = _unit(self._normals[triangle] + 0.5 * rng.normal(size=(count, 3)))
+            ways = unit(self._normals[triangle] + 0.5 * rng.normal(size=(count, 3)))
             return self._places[vertex], ways * rng.choice((-1.0, 1.0), (count, 1))
         points, one, other = self._folds(count, rng)
         if kind == "edges":
-            ways = _unit(one + other + 0.5 * rng.normal(size=(count, 3)))
+            ways = unit(one + other + 0.5 * rng.normal(size=(count, 3)))
             seen = np.sign((ways * one).sum(axis=1)) == np.sign((ways * other).sum(axis=1))
         else:
             cosine = rng.uniform(*_COSINES, (count, 1))
-            ways = cosine * one + np.sqrt(1 - cosine**2) * _unit(np.cross(one, rng.normal(size=(count, 3))))
+            ways = leaning(one, cosine, rng)
             seen = (ways * other).sum(axis=1) >= cosine[:, 0]
         return points[seen], ways[seen] * rng.choice((-1.0, 1.0), (np.count_nonzero(seen), 1))
 

@@ -49,6 +49,21 @@ def test_rows_and_page(folders, monkeypatch):
                                   "36000"], catch_exceptions=False)
 
 
+def test_what_cannot_be_measured(folders):
+    scenes, docs = folders
+    assert run(scenes, docs, "--rays", "1800").exit_code == 0
+    kept = (docs / "results/cracks.json").read_text()
+    result = run(scenes, docs, "--rays", "1800", "--format", "7.18")
+    assert result.exit_code == 2
+    assert ("has results of format 7.16, which cannot stand beside those of 7.18; leave out --only, or name another "
+            "folder with --docs") in " ".join(result.output.split())
+    (scenes / MESHES["bunny"]).write_text("\n".join(SQUARE.splitlines()[:-1]) + "\n")
+    result = run(scenes, docs, "--rays", "3600")
+    assert result.exit_code == 2
+    assert "no two triangles share an edge, so there is nothing to aim at" in " ".join(result.output.split())
+    assert (docs / "results/cracks.json").read_text() == kept
+
+
 def test_a_scene_that_is_not_there(folders):
     scenes, docs = folders
     (scenes / MESHES["bunny"]).unlink()
