@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-__all__ = ["DviError", "DviReceiver", "ReceivedFrame", "decode_byte"]
+__all__ = ["DviError", "DviReceiver", "ReceivedFrame", "decode_byte", "unpacked"]
 
 #: The four symbols that no byte has, by their two controls. As sent, first bit first: 0010101011 and so on.
 _CONTROL_TEXT = ("0010101011", "1101010100", "0010101010", "1101010101")
@@ -26,6 +26,13 @@ def decode_byte(symbol):
     q = symbol & 255 ^ (255 if inverted else 0)
     d = q ^ q << 1 & 255
     return d if exclusive else d ^ 254
+
+
+def unpacked(pairs):
+    """Bits in the order sent, of pairs for four channels in each integer."""
+    pairs = np.asarray(pairs, np.uint8)
+    return np.stack([np.stack([pairs >> 2 * channel & 1, pairs >> 2 * channel + 1 & 1], axis=-1).ravel()
+                     for channel in range(4)])
 
 
 def _bytes_table():

@@ -15,10 +15,10 @@ from .build import bench_defines
 from .component_build import component_library
 from .machine import draw_frame, load_image
 
-__all__ = ["SdramBench", "render_sdram"]
+__all__ = ["PARTS", "SdramBench", "render_sdram"]
 
-#: In the order of sdram_chip.h
-_PARTS = ("AS4C16M16SA-6", "AS4C16M16SA-7", "MT48LC16M16A2-75")
+#: SDRAMs that there are models of, in the order of sdram_chip.h
+PARTS = ("AS4C16M16SA-6", "AS4C16M16SA-7", "MT48LC16M16A2-75")
 _COUNTS = ("data_cycles", "refreshes", "activations", "reads", "writes", "violations")
 
 
@@ -56,7 +56,7 @@ class SdramBench(Bench):
             getattr(library, f"bench_{name}").restype = c_uint64
         library.bench_new.restype = c_void_p
         library.bench_violation.restype = c_char_p
-        self._bench = c_void_p(library.bench_new(_PARTS.index(part), c_double(1000 / (chip_mhz or clock_mhz))))
+        self._bench = c_void_p(library.bench_new(PARTS.index(part), c_double(1000 / (chip_mhz or clock_mhz))))
         self._memories = {}
 
     def load(self, name, words):

@@ -3,7 +3,7 @@
 import re
 
 from amaranth.back import verilog
-from amaranth.hdl import Const, ValueCastable
+from amaranth.hdl import ClockDomain, Const, Fragment, ValueCastable
 from amaranth.hdl._ir import PortDirection
 from amaranth.lib import wiring
 
@@ -14,8 +14,11 @@ _CONSTANT = re.compile(r"^  always @\*\n(?=    \S+ = \d+'h[0-9a-f]+;\n)", re.MUL
 _ZERO = re.compile(r"^ +\S+ ?\[\d+\] = \d+'h0+;\n", re.MULTILINE)
 
 
-def component_verilog(component, *, name):
+def component_verilog(component, *, name, domains=()):
     """Verilog text of ``component`` as module ``name``; a member a.b becomes the port a_b.
+
+    Of more ``domains`` than one the names must be given, in which order their clocks and resets become ports: else it
+    would be another one each time.
 
     Unlike :func:`amaranth.back.verilog.convert` by itself, this takes streams that are always ready: their
     ``ready`` is a constant and becomes no port.
@@ -27,6 +30,11 @@ def component_verilog(component, *, name):
         if not isinstance(value, Const):
             direction = PortDirection.Input if member.flow == wiring.In else PortDirection.Output
             ports["_".join(map(str, path))] = (value, direction)
+    if domains:
+        component = Fragment.get(component, None)
+        clocks = [ClockDomain(domain) for domain in domains]
+        component.add_domains(*clocks)
+        ports |= {signal.name: (signal, PortDirection.Input) for clock in clocks for signal in (clock.clk, clock.rst)}
     text = verilog.convert(component, name=name, ports=ports, emit_src=False, strip_internal_attrs=True)
     # What has nothing to wait for is never executed: constant fields of signals that are assigned piece by piece.
     text = _CONSTANT.sub("  initial\n", text)

@@ -5,20 +5,13 @@ from amaranth.hdl import Value
 from amaranth.sim import Simulator
 
 from rtl.video.mode import VideoMode
-from sim.machine.dvi_receiver import DviReceiver
+from sim.machine.dvi_receiver import DviReceiver, unpacked
 
-__all__ = ["TINY", "expected_bars", "received", "unpacked"]
+__all__ = ["TINY", "expected_bars", "received"]
 
 #: As little as there can be of a screen
 TINY = VideoMode(name="tiny", pixel_mhz=25.0, width=48, h_front=3, h_sync=5, h_back=16, height=20, v_front=2, v_sync=3,
                  v_back=4, h_positive=True)
-
-
-def unpacked(pairs):
-    """Bits in the order sent, of pairs for four channels in each integer."""
-    pairs = np.asarray(pairs, np.uint8)
-    return np.stack([np.stack([pairs >> 2 * channel & 1, pairs >> 2 * channel + 1 & 1], axis=-1).ravel()
-                     for channel in range(4)])
 
 
 def received(dut, *, clocks, phase=0.0, sync=None, testbenches=(), keep=False):
