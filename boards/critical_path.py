@@ -43,16 +43,19 @@ def _signal(cell):
     return _ADDED.sub("", cell.removeprefix("component."))
 
 
-def slowest(report):
+def slowest(report, clock=None):
     """The slowest path from a rising edge to the next.
 
     Parameters
     ----------
     report : dict
         As nextpnr's ``--report`` writes it.
+    clock : str, optional
+        Name of the clock's net, if there are several.
     """
     steps = next(path["path"] for path in report["critical_paths"]
-                 if path["from"].startswith("posedge") and path["to"].startswith("posedge"))
+                 if path["from"].startswith("posedge") and path["to"].startswith("posedge")
+                 and (clock is None or path["from"] == path["to"] == f"posedge {clock}"))
     spent = {True: 0.0, False: 0.0}
     for step in steps:
         spent[step["type"] == "routing"] += step["delay"]

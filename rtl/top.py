@@ -13,6 +13,9 @@ from .video.dvi_transmitter import NUM_CHANNELS
 
 __all__ = ["Top"]
 
+#: On a word's way to the SDRAM and back
+_PIN_REGISTERS = 2
+
 
 class Top(wiring.Component):
     """A chip that a host loads with a scene over a cable, and that draws it on a screen.
@@ -32,21 +35,19 @@ class Top(wiring.Component):
         2 for pictures of half its width and height.
     divisor : int
         Cycles of a bit of the cable, see :func:`~rtl.host.uart.uart_divisor`.
-    input_delay : int
-        See :class:`~rtl.sdram.controller.Controller`.
 
     Members
     -------
     rx, tx : the cable
-    pins : to the SDRAM
+    pins : to the SDRAM, through a register in each pin and for each direction
     pairs : to the screen, see :class:`~rtl.video.dvi_transmitter.DviTransmitter`
     lamps : for people: a picture may be started; one is drawn; a line of the screen was late, ever
     """
 
-    def __init__(self, config, *, timing, mode, scale=2, divisor, input_delay=0):
+    def __init__(self, config, *, timing, mode, scale=2, divisor):
         self.map = TopMap(config)
         chip = timing.chip
-        self._system = MemorySystem(config, timing=timing, host=True, display=True, input_delay=input_delay)
+        self._system = MemorySystem(config, timing=timing, host=True, display=True, input_delay=_PIN_REGISTERS)
         self._display = Display(mode, chip=chip, scale=scale, stride=FRAME_STRIDE)
         self._link = HostLink(divisor=divisor, word_width=chip.word_width, num_registers=len(self.map.registers),
                               num_values=len(self.map.values), num_guarded=self.map.num_guarded)
@@ -95,7 +96,7 @@ class Top(wiring.Component):
             system.camera.eq(Cat(registers[f"camera{word}"] for word in range(self.map.num_camera_words))),
             system.width.eq(size[:16]), system.height.eq(size[16:]),
             *(getattr(system, name).eq(register) for name, register in registers.items()
-              if name in ("root", "background") or name.endswith("_base") and not name.startswith("frame")),
+              if name in ("root", "background") or (name.endswith("_base") and not name.startswith("frame"))),
             *(display.bases[number].eq(registers[f"frame{number}_base"]) for number in range(2)),
             display.test.eq(registers["options"][0]),
         ]

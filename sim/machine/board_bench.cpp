@@ -57,7 +57,9 @@ struct Bench {
     Cable cable;
     // In picoseconds
     uint64_t sync_period, shift_period, next_sync = 0, next_shift = 0, shifts = 0, cycle = 0;
-    uint16_t dq = 0;
+    // In the registers of the pins
+    sdram::Pins out{false, true, true, true, true, false, 0, 0, 3, 0};
+    uint16_t in = 0, dq = 0;
     uint8_t* pairs = nullptr;
     uint64_t pairs_left = 0;
 
@@ -93,14 +95,16 @@ struct Bench {
     // The falling edge comes first: it is when the chip's logic sees what was set since the last rising edge.
     void tick() {
         while (next_shift <= next_sync) shift();
-        chip->pins_dq_i = dq;
+        chip->pins_dq_i = in;
         chip->rx = cable.drive();
         chip->clk = 0;
         chip->eval();
         cable.sense(chip->tx);
-        dq = memory.edge({bool(chip->pins_cke), bool(chip->pins_cs_n), bool(chip->pins_ras_n), bool(chip->pins_cas_n),
-                          bool(chip->pins_we_n), bool(chip->pins_dq_oe), chip->pins_ba, chip->pins_a, chip->pins_dqm,
-                          chip->pins_dq_o});
+        in = dq;
+        dq = memory.edge(out);
+        out = {bool(chip->pins_cke), bool(chip->pins_cs_n), bool(chip->pins_ras_n), bool(chip->pins_cas_n),
+               bool(chip->pins_we_n), bool(chip->pins_dq_oe), chip->pins_ba, chip->pins_a, chip->pins_dqm,
+               chip->pins_dq_o};
         chip->clk = 1;
         chip->eval();
         ++cycle;

@@ -37,7 +37,7 @@ class SimulatedBoard:
     scale : int
         2 for pictures of half its width and height.
     divisor : int
-        Cycles of a bit of the cable. The least that the UART can, as a real one's 3 Mbaud would be most of the simulation.
+        Cycles of a bit of the cable; by default the least that there can be, as loading is most of a simulation.
     part : str
         The SDRAM.
     progress : callable

@@ -25,7 +25,8 @@ _MEMBERS = ("width", "h_front", "h_sync", "h_back", "height", "v_front", "v_sync
 def monitor(mode, *, frames=1, progress=lambda text: None):
     """A :class:`DviReceiver` behind a screen of a mode, for so many whole frames."""
     library = ctypes.CDLL(str(component_library(
-        BarScreen(mode), bench=Path(__file__).with_name("screen.cpp"), domains=("pixel", "shift"), optimise="-O1", progress=progress)))
+        BarScreen(mode), bench=Path(__file__).with_name("screen.cpp"), domains=("pixel", "shift"),
+        optimise="-O1", progress=progress)))
     # It begins behind the last visible line, and a frame from the next vertical sync on.
     clocks = mode.h_total * (frames * mode.v_total + mode.v_front + 2)
     pairs = np.empty(5 * clocks, np.uint8)

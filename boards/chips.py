@@ -1,0 +1,15 @@
+"""The chips that boards are built with by default, by what fits."""
+
+from fpu import FloatFormat
+from rtl.config import ChipConfig
+from rtl.program.features import ShaderFeatures
+
+__all__ = ["FULL", "SIMPLE", "SMALL"]
+
+#: All that the shader can do. The paper's 64 threads would take more block RAMs than an LFE5U-85F has.
+FULL = ChipConfig(num_threads=32, shader=ShaderFeatures(depth=4))
+#: Colours and a cosine, the paper's format and caches, for an LFE5U-45F.
+SIMPLE = ChipConfig(num_threads=32)
+#: For an LFE5U-25F: as many threads and lines as its 56 block RAMs hold, in a format in which the room looks right.
+SMALL = ChipConfig(fmt=FloatFormat(6, 12), num_threads=8, stack_depth=16, edge_tolerance=0, mailbox_entries=0,
+                   node_lines=128, list_lines=64, matrix_lines=64, index_width=16, coord_width=10)
