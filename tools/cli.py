@@ -4,15 +4,19 @@ import click
 
 from .arithmetic import arithmetic
 from .bench import bench
+from .build import build
 from .chart import chart
 from .cracks import cracks
 from .first_light import first_light
 from .fit import fit
 from .fpu_report import fpu_report
 from .inspect import image
+from .load import load
 from .pipeline import pipeline
 from .render import render
+from .simulated import simulated
 from .stability import stability
+from .view import view
 
 __all__ = ["main"]
 
@@ -25,12 +29,16 @@ def main():
 
 main.add_command(arithmetic)
 main.add_command(bench)
+main.add_command(build)
 main.add_command(chart)
 main.add_command(cracks)
 main.add_command(first_light)
 main.add_command(fit)
 main.add_command(fpu_report)
+main.add_command(load)
 main.add_command(pipeline)
 main.add_command(render)
+main.add_command(simulated)
 main.add_command(stability)
+main.add_command(view)
 main.add_command(image)

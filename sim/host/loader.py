@@ -11,6 +11,7 @@ from rtl.sdram.commands import MAX_WORDS
 from rtl.top_map import TopMap
 
 from ..machine.machine import camera_words, memory_words
+from ..machine.moving import port_writes
 from .driver import LinkError
 
 __all__ = ["Loader"]
@@ -88,6 +89,7 @@ class Loader:
             raise LinkError(f"the scene has {4 * sum(words.size for _, words in places.values()):,} bytes and its two "
                             f"frames {8 * self._frame_words:,}; the board's memory has "
                             f"{4 * self._driver.memory_words:,}: use a smaller scene, or its objects as instances")
+        self._places = {name: at for name, (at, _) in places.items()}
         total, done = 4 * sum(words.size for _, words in places.values()), 0
         for name, (at, words) in places.items():
             self._set(f"{name}_base", at // MAX_WORDS)
@@ -96,21 +98,35 @@ class Loader:
                 self._driver.write(at + start, piece)
                 done += 4 * len(piece)
                 self._progress(done, total)
-        self._set("root", image.root)
 
-    def draw(self, image, camera, *, background=(0, 0, 0)):
-        """Draws the image that is loaded, and waits until its picture is on the screen.
+    def update(self, pieces):
+        """Writes pieces of an update, which may be while a picture is drawn that does not need what they replace.
+
+        Parameters
+        ----------
+        pieces : list of Piece
+            Of a :class:`~sim.scene.slots.SceneUpdate`.
+        """
+        for name, first, words in port_writes(pieces):
+            self._driver.write(self._places[name] + first, words.tolist())
+
+    def start(self, image, camera, *, background=(0, 0, 0)):
+        """Starts a picture of the image that is loaded, or of what it was updated to."""
+        self._set("root", image.root)
+        red, green, blue = background
+        self._set("background", red << 16 | green << 8 | blue)
+        for number, word in enumerate(camera_words(image, camera, self._size[0]).tolist()):
+            self._set(f"camera{number}", word)
+        self._driver.start()
+
+    def wait(self):
+        """Waits until the picture that was started is on the screen.
 
         Returns
         -------
         dict
             The chip's counters, by name.
         """
-        red, green, blue = background
-        self._set("background", red << 16 | green << 8 | blue)
-        for number, word in enumerate(camera_words(image, camera, self._size[0]).tolist()):
-            self._set(f"camera{number}", word)
-        self._driver.start()
         self._wait()
         names = self._map.values[_NUM_OWN:]
         return dict(zip(names, self._values(names[0], len(names)), strict=True))

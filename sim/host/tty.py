@@ -105,7 +105,13 @@ class PseudoTerminal:
         readable, writable, _ = select.select([self._file], writes, [], seconds)
         if readable:
             self._unsent += board.receive(os.read(self._file, _CHUNK))
-        if self._unsent and (writable or readable):
+        if writable or readable:
+            self.send(b"")
+
+    def send(self, answer):
+        """Passes what a board says, behind what could not be passed before, as far as that can be done now."""
+        self._unsent += answer
+        if self._unsent:
             try:
                 self._unsent = self._unsent[os.write(self._file, self._unsent):]
             except BlockingIOError:

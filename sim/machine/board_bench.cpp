@@ -159,7 +159,7 @@ uint64_t bench_unwatched(Bench* bench) { return bench->pairs_left; }
 
 uint64_t bench_cycle(Bench* bench) { return bench->cycle; }
 
-uint64_t bench_unsent(Bench* bench) { return bench->cable.to_chip.size(); }
+uint32_t bench_lamps(Bench* bench) { return bench->chip->lamps; }
 
 const char* bench_violation(Bench* bench) { return bench->memory.first_violation.c_str(); }
 }

@@ -58,7 +58,7 @@ class SimulatedBoard:
         library = ctypes.CDLL(str(component_library(
             self.top, bench=Path(__file__).with_name("board_bench.cpp"), domains=("sync", "pixel", "shift"),
             progress=progress)))
-        for name in ("cycle", "received", "unwatched", "unsent"):
+        for name in ("cycle", "received", "unwatched"):
             getattr(library, f"bench_{name}").restype = c_uint64
         library.bench_new.restype = c_void_p
         library.bench_violation.restype = c_char_p
@@ -66,6 +66,8 @@ class SimulatedBoard:
         self._bench = c_void_p(library.bench_new(
             PARTS.index(part), c_uint64(round(1e6 / clock_mhz)), c_uint64(round(1e6 / (5 * mode.pixel_mhz))), divisor))
         self._buffer = (c_uint8 * _CHUNK)()
+        # Come while the screen was watched
+        self._earlier = b""
 
     def close(self):
         """Ends the simulation."""
@@ -101,7 +103,8 @@ class SimulatedBoard:
 
     def _received(self):
         count = self._library.bench_received(self._bench, self._buffer, c_uint64(_CHUNK))
-        return bytes(self._buffer[:count])
+        received, self._earlier = self._earlier + bytes(self._buffer[:count]), b""
+        return received
 
     def write(self, sent):
         """Bytes to the board, which go while it runs."""
@@ -110,6 +113,21 @@ class SimulatedBoard:
     def read(self, seconds):
         """Bytes that have come, none if none do in so many seconds of the board."""
         return self.run(max(1, round(seconds * self._clock_mhz * 1e6)), until_byte=True)
+
+    def receive(self, sent):
+        """As :meth:`write`, for a pseudo-terminal; what is answered comes later."""
+        self.write(sent)
+        return b""
+
+    @property
+    def is_ready(self):
+        """Whether its lamp says that a picture may be started: the last one is on the screen."""
+        return bool(self._library.bench_lamps(self._bench) & 1)
+
+    @property
+    def is_drawing(self):
+        """Whether its lamp says that a picture is drawn."""
+        return bool(self._library.bench_lamps(self._bench) & 2)
 
     def clock(self):
         """Seconds of the board since it was switched on."""
@@ -136,5 +154,5 @@ class SimulatedBoard:
         pairs = np.zeros(5 * mode.h_total * mode.v_total * (frames + 1) + 5 * mode.h_total, np.uint8)
         self._library.bench_watch(self._bench, pairs.ctypes.data_as(POINTER(c_uint8)), c_uint64(pairs.size))
         while self._library.bench_unwatched(self._bench):
-            self.run(_STRIDE)
+            self._earlier = self.run(_STRIDE)
         return DviReceiver(unpacked(pairs)).frames()[:frames]

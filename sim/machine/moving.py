@@ -2,20 +2,28 @@
 
 import time
 
+import numpy as np
+
 from ..scene.slots import upload_report
 from .bench import Bench
 from .machine import draw_frame, load_image
 
-__all__ = ["render_frames"]
+__all__ = ["port_writes", "render_frames"]
 
 # The chip's memories of full shading, by the image's names.
 _PORTS = {"records": "shading", "texels": "textures"}
 
 
-def _write(bench, pieces):
+def port_writes(pieces):
+    """Of each piece of an update the chip's memory, the number of its first word, and its words."""
     for piece in pieces:
         words = 1 if piece.items.ndim == 1 else piece.items.shape[1]
-        bench.write(_PORTS.get(piece.memory, piece.memory), piece.first * words, piece.items)
+        yield _PORTS.get(piece.memory, piece.memory), piece.first * words, np.ravel(piece.items)
+
+
+def _write(bench, pieces):
+    for name, first, words in port_writes(pieces):
+        bench.write(name, first, words)
 
 
 def render_frames(compiled, poses, width, height, *, config, background=(0, 0, 0), latency=4, jitter=0, seed=1,

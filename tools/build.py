@@ -1,0 +1,71 @@
+"""``dynrt build``: a board's bitstream, with its timing and area."""
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from boards.bitstream import board_design, pack_bitstream, route
+from boards.catalog import BOARDS
+from boards.design import synthesise
+from boards.toolchain import versions
+
+from .board_options import board_argument, board_chip, chip_option
+from .build_report import built, missed, words
+from .chip_file import chip_text
+from .engines import progress_on
+from .errors import BadInput, Failure, clear_errors, written_whole
+from .results import json_text, write_texts
+
+__all__ = ["build"]
+
+
+@click.command()
+@board_argument
+@chip_option
+@click.option("--clock", "clock_mhz", type=click.FloatRange(min=10), help="MHz of chip and SDRAM  [default: what the "
+              "board's own chip has been seen to reach]")
+@click.option("--seeds", type=click.IntRange(1), default=1, show_default=True, help="Placements to try; the fastest "
+              "becomes the bitstream, the report has all")
+@click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), help="Folder to write BOARD.bit, "
+              "chip.json and report.json to  [default: build/BOARD]")
+@click.option("--results", type=click.Path(dir_okay=False, path_type=Path), help="Where to keep the report besides")
+def build(board, parameters, clock_mhz, seeds, output, results):
+    """Build the bitstream of BOARD; fails if no placement is fast enough for its clocks.
+
+    Synthesis of a full chip takes some minutes, a placement a quarter of an hour; what has been done is kept.
+    """
+    chosen = BOARDS[board]
+    config = board_chip(chosen, parameters)
+    output = output or Path("build") / board
+    console = Console(stderr=True, highlight=False)
+    with clear_errors():
+        target = clock_mhz or chosen.clock_mhz
+        try:
+            design, clocks = board_design(chosen, config=config, clock_mhz=target)
+        except ValueError as error:
+            raise BadInput(f"--clock: {error}") from error
+        tools = versions()
+        with progress_on(console, "synthesis") as progress:
+            synthesise(design)
+            routed = []
+            for seed in range(1, seeds + 1):
+                progress(f"place and route, seed {seed} of {seeds}")
+                routed.append(route(chosen, design, seed=seed, target_mhz=target))
+                console.print(words(routed[-1], clocks), markup=False)
+        report = built(chosen, config, clocks, routed, tools)
+        try:
+            output.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise BadInput(f"{output}: cannot be made: {error.strerror}") from error
+        write_texts({output / "report.json": json_text(report), output / "chip.json": chip_text(config)}
+                    | ({results: json_text(report)} if results else {}))
+        if failed := missed(routed, clocks):
+            raise Failure(f"{board}: {failed}; report.json has its slowest path. Ask for a slower --clock, or for more "
+                          "--seeds")
+        best = max((each for each in routed if not missed([each], clocks)), key=lambda each: each.mhz["sync"])
+        with written_whole(output / f"{board}.bit") as path:
+            path.write_bytes(pack_bitstream(chosen, design, seed=best.seed, target_mhz=target))
+        console.print(f"{output / f'{board}.bit'}: seed {best.seed}, chip and SDRAM at {clocks['sync']:g} MHz; load it "
+                      f"with openFPGALoader, then dynrt load SCENE --port ... --chip {output / 'chip.json'}",
+                      markup=False)
