@@ -3,9 +3,11 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 SCENES ?= ../shared/scenes
+BOARD  ?= ulx3s_85f
+SEEDS  ?= 1
 
 .PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants damage pipeline chart bench stability \
-	cracks sdram clean
+	cracks sdram bitstream board clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
@@ -20,6 +22,8 @@ help:
 	@echo "make bench        the paper's Tables 3 and 4 beside it and beside Embree: docs/benchmarks.md and .html"
 	@echo "make stability    where ray/triangle tests fail, the chip's and others': the figures of docs/accuracy.md"
 	@echo "make cracks       a hundred million rays at the edges of real meshes, for docs/accuracy.md"
+	@echo "make bitstream    build/BOARD/BOARD.bit, BOARD=$(BOARD): ulx3s_85f, ulx3s_45f, ulx3s_25f or icepi_zero; SEEDS=$(SEEDS)"
+	@echo "make board        the room over the cable of a board simulated at its pins: build/board/screen.png"
 	@echo "make sdram        the figures of docs/memory.md: a hundred million random accesses to an SDRAM, and its speed"
 	@echo "make damage       ten thousand damaged scene files of each kind, read or refused: docs/results/damage.json"
 	@echo "make mutants      faults planted in the operators, each found by a test: docs/results/mutants.json"
@@ -82,6 +86,13 @@ sdram: setup
 	@mkdir -p build
 	$(BIN)/dynrt render room --memory sdram --output build/sdram-room.png --report docs/results/sdram-room.json
 	$(BIN)/python -m tests.rtl.sdram.page
+
+bitstream: setup
+	$(BIN)/dynrt build $(BOARD) --seeds $(SEEDS)
+
+board: setup
+	@mkdir -p build/board
+	$(BIN)/python -m tests.sim.machine.board --board $(BOARD) --output build/board
 
 clean:
 	rm -rf build .pytest_cache .ruff_cache

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from itertools import product
 
-from amaranth.hdl import ClockSignal, Instance, Module, Signal
+from amaranth.hdl import ClockSignal, Instance, Module
 from amaranth.lib import wiring
 from amaranth.lib.cdc import ResetSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -13,8 +13,8 @@ __all__ = ["Clock", "Pll", "PllPlan", "plan_pll"]
 #: Lattice, *ECP5 and ECP5-5G Family Data Sheet* (FPGA-DS-02012), sysCLOCK PLL timing; MHz.
 _INPUT, _COMPARED, _OSCILLATOR, _OUTPUT = (8, 400), (10, 400), (400, 800), (3.125, 400)
 _MAX_INPUT_DIVIDER, _MAX_FEEDBACK_DIVIDER, _MAX_OUTPUT_DIVIDER = 128, 80, 128
-#: Of EHXPLLL; the first is also what goes back to be compared.
-_OUTPUTS = ("CLKOP", "CLKOS", "CLKOS2", "CLKOS3")
+#: Of EHXPLLL; a fourth, CLKOS3, is what goes back inside of it to be compared.
+_OUTPUTS = ("CLKOP", "CLKOS", "CLKOS2")
 #: Of the clock that is asked for
 _TOLERANCE = 0.008
 
@@ -47,8 +47,8 @@ class PllPlan:
 
     Attributes
     ----------
-    input_divider, feedback_divider : int
-        The first clock is the input's · ``feedback_divider`` / ``input_divider``.
+    input_divider, feedback_divider, feedback_output : int
+        The oscillator's clock is the input's · ``feedback_divider`` · ``feedback_output`` / ``input_divider``.
     dividers, phases : tuple of int
         Of the oscillator, for each clock, and by how many of its periods each is late.
     oscillator_mhz : float
@@ -59,6 +59,7 @@ class PllPlan:
 
     input_divider: int
     feedback_divider: int
+    feedback_output: int
     dividers: tuple
     phases: tuple
     oscillator_mhz: float
@@ -77,7 +78,7 @@ def plan_pll(input_mhz, clocks):
     input_mhz : float
         The oscillator on the board.
     clocks : list of Clock
-        Up to four.
+        Up to three.
 
     Raises
     ------
@@ -89,27 +90,23 @@ def plan_pll(input_mhz, clocks):
     if not 1 <= len(clocks) <= len(_OUTPUTS):
         raise ValueError(f"{len(clocks)} clocks; a PLL has 1 to {len(_OUTPUTS)}")
     best = None
-    dividers = range(1, _MAX_OUTPUT_DIVIDER + 1)
-    for divider, feedback in product(range(1, _MAX_INPUT_DIVIDER + 1), range(1, _MAX_FEEDBACK_DIVIDER + 1)):
-        first = input_mhz * feedback / divider
-        if not _within(input_mhz / divider, _COMPARED) or abs(first / clocks[0].mhz - 1) > _TOLERANCE:
+    for divider, multiple in product(range(1, _MAX_INPUT_DIVIDER + 1), range(1, _OSCILLATOR[1] + 1)):
+        oscillator = input_mhz / divider * multiple
+        feedback = next((each for each in range(_MAX_FEEDBACK_DIVIDER, 0, -1)
+                         if multiple % each == 0 and multiple // each <= _MAX_OUTPUT_DIVIDER), None)
+        if feedback is None or not (_within(input_mhz / divider, _COMPARED) and _within(oscillator, _OSCILLATOR)):
             continue
-        for first_divider in dividers:
-            oscillator = first * first_divider
-            if not _within(oscillator, _OSCILLATOR):
-                continue
-            chosen = [first_divider, *(min(dividers, key=lambda each: abs(oscillator / each / clock.mhz - 1))
-                                       for clock in clocks[1:])]
-            found = [oscillator / each for each in chosen]
-            error = max(abs(mhz / clock.mhz - 1) for mhz, clock in zip(found, clocks, strict=True))
-            phases = tuple(round(clock.lag_ns * oscillator / 1000) % each
-                           for clock, each in zip(clocks, chosen, strict=True))
-            if error <= _TOLERANCE and all(_within(mhz, _OUTPUT) for mhz in found) and phases[0] == 0:
-                plan = PllPlan(input_divider=divider, feedback_divider=feedback, dividers=tuple(chosen), phases=phases,
-                               oscillator_mhz=oscillator, mhz=tuple(found))
-                rank = round(error, 6), -oscillator
-                if best is None or rank < best[0]:
-                    best = rank, plan
+        dividers = tuple(min(max(round(oscillator / clock.mhz), 1), _MAX_OUTPUT_DIVIDER) for clock in clocks)
+        found = tuple(oscillator / each for each in dividers)
+        error = max(abs(mhz / clock.mhz - 1) for mhz, clock in zip(found, clocks, strict=True))
+        if error > _TOLERANCE or not all(_within(mhz, _OUTPUT) for mhz in found):
+            continue
+        phases = tuple(round(clock.lag_ns * oscillator / 1000) % each
+                       for clock, each in zip(clocks, dividers, strict=True))
+        rank = round(error, 6), -oscillator
+        if best is None or rank < best[0]:
+            best = rank, PllPlan(input_divider=divider, feedback_divider=feedback, feedback_output=multiple // feedback,
+                                 dividers=dividers, phases=phases, oscillator_mhz=oscillator, mhz=found)
     if best is None:
         wanted = ", ".join(f"{clock.mhz:g}" for clock in clocks)
         raise ValueError(f"no PLL makes {wanted} MHz of {input_mhz:g} within {100 * _TOLERANCE:g} %; ask for others")
@@ -149,18 +146,18 @@ class Pll(wiring.Component):
         plan, parameters, outputs = self.plan, {}, {}
         for output, clock, divider, phase in zip(_OUTPUTS, self._clocks, plan.dividers, plan.phases, strict=False):
             parameters |= {f"p_{output}_ENABLE": "ENABLED", f"p_{output}_DIV": divider,
-                           # In phase with what is compared is a divider's last period.
+                           # Of no phase is a divider's last period.
                            f"p_{output}_CPHASE": divider - 1 + phase, f"p_{output}_FPHASE": 0}
             outputs[f"o_{output}"] = ClockSignal(clock.domain)
             if clock.reset:
                 m.submodules[f"{clock.domain}_reset"] = ResetSynchronizer(~self.locked, domain=clock.domain)
-        fed_back = Signal()
-        m.d.comb += fed_back.eq(ClockSignal(self._clocks[0].domain))
         m.submodules.pll = Instance(
             "EHXPLLL", a_ICP_CURRENT="12", a_LPF_RESISTOR="8", a_MFG_ENABLE_FILTEROPAMP="1", a_MFG_GMCREF_SEL="2",
-            p_CLKI_DIV=plan.input_divider, p_CLKFB_DIV=plan.feedback_divider, p_FEEDBK_PATH="CLKOP",
+            p_CLKI_DIV=plan.input_divider, p_CLKFB_DIV=plan.feedback_divider, p_FEEDBK_PATH="INT_OS3",
+            p_CLKOS3_ENABLE="ENABLED", p_CLKOS3_DIV=plan.feedback_output, p_CLKOS3_CPHASE=plan.feedback_output - 1,
+            p_CLKOS3_FPHASE=0,
             p_PLLRST_ENA="DISABLED", p_INTFB_WAKE="DISABLED", p_STDBY_ENABLE="DISABLED", p_DPHASE_SOURCE="DISABLED",
             p_OUTDIVIDER_MUXA="DIVA", p_OUTDIVIDER_MUXB="DIVB", p_OUTDIVIDER_MUXC="DIVC", p_OUTDIVIDER_MUXD="DIVD",
-            **parameters, i_CLKI=self.clock, i_CLKFB=fed_back, i_RST=0, i_STDBY=0, i_PHASESEL0=0, i_PHASESEL1=0,
+            **parameters, i_CLKI=self.clock, i_CLKFB=0, i_RST=0, i_STDBY=0, i_PHASESEL0=0, i_PHASESEL1=0,
             i_PHASEDIR=0, i_PHASESTEP=0, i_PHASELOADREG=0, i_PLLWAKESYNC=0, i_ENCLKOP=0, o_LOCK=self.locked, **outputs)
         return m

@@ -11,6 +11,7 @@ from boards.design import synthesise
 from boards.toolchain import versions
 
 from .board_options import board_argument, board_chip, chip_option
+from .board_page import board_page, check_board_page
 from .build_report import built, missed, words
 from .chip_file import chip_text
 from .engines import progress_on
@@ -29,8 +30,9 @@ __all__ = ["build"]
               "becomes the bitstream, the report has all")
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), help="Folder to write BOARD.bit, "
               "chip.json and report.json to  [default: build/BOARD]")
-@click.option("--results", type=click.Path(dir_okay=False, path_type=Path), help="Where to keep the report besides")
-def build(board, parameters, clock_mhz, seeds, output, results):
+@click.option("--docs", type=click.Path(exists=True, file_okay=False, path_type=Path), help="Keep the report in "
+              "results/BOARD.json of this folder too, and fill the tables of its board.md")
+def build(board, parameters, clock_mhz, seeds, output, docs):
     """Build the bitstream of BOARD; fails if no placement is fast enough for its clocks.
 
     Synthesis of a full chip takes some minutes, a placement a quarter of an hour; what has been done is kept.
@@ -40,6 +42,8 @@ def build(board, parameters, clock_mhz, seeds, output, results):
     output = output or Path("build") / board
     console = Console(stderr=True, highlight=False)
     with clear_errors():
+        if docs is not None:
+            check_board_page(docs)
         target = clock_mhz or chosen.clock_mhz
         try:
             design, clocks = board_design(chosen, config=config, clock_mhz=target)
@@ -58,8 +62,10 @@ def build(board, parameters, clock_mhz, seeds, output, results):
             output.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise BadInput(f"{output}: cannot be made: {error.strerror}") from error
-        write_texts({output / "report.json": json_text(report), output / "chip.json": chip_text(config)}
-                    | ({results: json_text(report)} if results else {}))
+        write_texts({output / "report.json": json_text(report), output / "chip.json": chip_text(config)})
+        if docs is not None:
+            write_texts({docs / "results" / f"{board}.json": json_text(report),
+                         docs / "board.md": board_page(docs, report)})
         if failed := missed(routed, clocks):
             raise Failure(f"{board}: {failed}; report.json has its slowest path. Ask for a slower --clock, or for more "
                           "--seeds")

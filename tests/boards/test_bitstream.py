@@ -1,0 +1,64 @@
+"""A board's design, before it is synthesised: its pins and clocks, and that it is the same each time."""
+
+import hashlib
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from boards import bitstream
+from boards.bitstream import board_design
+from boards.catalog import BOARDS
+from rtl.config import ChipConfig
+
+#: Quick to elaborate
+TINY = ChipConfig(num_threads=2, mailbox_entries=0, stack_depth=4, edge_tolerance=0)
+#: Ports of an SDRAM of 16 bits, 13 rows and 2 of banks; of a screen; of a serial cable and a clock
+SDRAM_PINS = {"clk": 1, "clk_en": 1, "cs": 1, "ras": 1, "cas": 1, "we": 1, "ba": 2, "a": 13, "dq": 16, "dqm": 2}
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_every_pin_has_a_place(name):
+    board = BOARDS[name]
+    design, clocks = board_design(board, config=TINY, clock_mhz=board.clock_mhz)
+    places = dict(re.findall(r'^LOCATE COMP "(\S+)" SITE "(\w+)";$', design.files["top.lpf"], re.MULTILINE))
+    assert len(set(places.values())) == len(places), "two ports at one pin"
+    for port, width in SDRAM_PINS.items():
+        found = [place for place in places if re.fullmatch(rf"sdram_0__{port}__io(\[\d+\])?", place)]
+        assert len(found) == width, port
+    assert {"hdmi_0__clk__p", "uart_0__rx__io", "uart_0__tx__io"} <= set(places)
+    assert clocks["shift"] == pytest.approx(5 * clocks["pixel"])
+    assert clocks["sync"] == clocks["sdram"] == pytest.approx(board.clock_mhz)
+    assert f"FREQUENCY PORT \"clk{board.oscillator_mhz:g}_0__io\" {board.oscillator_mhz * 1e6:.1f} HZ;" in \
+        design.files["top.lpf"]
+
+
+def test_a_design_is_the_same_each_time():
+    """Else nothing that was synthesised would be found again."""
+    program = ("import hashlib; from boards.bitstream import board_design; from boards.catalog import BOARDS; "
+               "from tests.boards.test_bitstream import TINY; "
+               "design, _ = board_design(BOARDS['ulx3s_85f'], config=TINY, clock_mhz=50); "
+               "print(hashlib.sha256(repr(design.files).encode()).hexdigest())")
+    found = {subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True,
+                            env={**os.environ, "PYTHONHASHSEED": seed}).stdout for seed in ("1", "2")}
+    here, _ = board_design(BOARDS["ulx3s_85f"], config=TINY, clock_mhz=50)
+    assert found == {hashlib.sha256(repr(here.files).encode()).hexdigest() + "\n"}
+
+
+def test_what_cannot_be():
+    board = BOARDS["ulx3s_85f"]
+    with pytest.raises(ValueError, match=r"^the clock is 160 MHz; the SDRAM takes up to 133\.3$"):
+        board_design(board, config=TINY, clock_mhz=160)
+    with pytest.raises(ValueError, match=r"^3e\+06 baud at 10 MHz: "):
+        board_design(board, config=TINY, clock_mhz=10)
+    with pytest.raises(ValueError, match=r"^no PLL makes 1000, 200 MHz of 25 "):
+        board_design(replace(board, mode=replace(board.mode, pixel_mhz=200)), config=TINY, clock_mhz=50)
+
+
+@pytest.mark.parametrize(("net", "domain"), [
+    ("$glbnet$clk", "sync"), ("clk", "sync"), ("$glbnet$pixel_clk", "pixel"), ("shift_clk", "shift")])
+def test_nets_of_clocks(net, domain):
+    assert bitstream._domain(net) == domain
