@@ -56,7 +56,7 @@ def build(board, parameters, clock_mhz, seeds, output, docs):
             for seed in range(1, seeds + 1):
                 progress(f"place and route, seed {seed} of {seeds}")
                 routed.append(route(chosen, design, seed=seed, target_mhz=target))
-                console.print(words(routed[-1], clocks), markup=False)
+                console.print(words(routed[-1], clocks), markup=False, soft_wrap=True)
         report = built(chosen, config, clocks, routed, tools)
         try:
             output.mkdir(parents=True, exist_ok=True)
@@ -74,4 +74,4 @@ def build(board, parameters, clock_mhz, seeds, output, docs):
             path.write_bytes(pack_bitstream(chosen, design, seed=best.seed, target_mhz=target))
         console.print(f"{output / f'{board}.bit'}: seed {best.seed}, chip and SDRAM at {clocks['sync']:g} MHz; load it "
                       f"with openFPGALoader, then dynrt load SCENE --port ... --chip {output / 'chip.json'}",
-                      markup=False)
+                      markup=False, soft_wrap=True)

@@ -34,7 +34,7 @@ def load(scene, link, camera, view, background, output):
         chosen = camera_of(loaded, camera, view)
         image = compiled.image(loaded, eye=chosen.eye, is_full=order.is_full, background=background)
         for warning in [*loaded.warnings, *compiled.warnings]:
-            console.print(f"warning: {warning}", markup=False)
+            console.print(f"warning: {warning}", markup=False, soft_wrap=True)
         with console.status("opening the link") as status, linked(
                 link, progress=lambda done, total: status.update(f"{done:,} of {total:,} bytes")) as board:
             begin = time.monotonic()
@@ -46,10 +46,10 @@ def load(scene, link, camera, view, background, output):
             picture = None if output is None else board.picture()
         size = link.board.size
         console.print(f"{image.num_bytes:,} bytes in {seconds:.1f} s; {size[0]}x{size[1]} in {counters['cycles']:,} "
-                      f"cycles, {counters['cycles'] / (size[0] * size[1]):.2f} a pixel", markup=False)
+                      f"cycles, {counters['cycles'] / (size[0] * size[1]):.2f} a pixel", markup=False, soft_wrap=True)
         if output is not None:
             model = model_picture(order, image, chosen, order.chip_for(compiled))
             wrong = int((picture != model.color).any(axis=-1).sum())
             with written_whole(output) as path:
                 save_picture(path, picture)
-            console.print(f"{output}: {wrong} pixels differ from the model", markup=False)
+            console.print(f"{output}: {wrong} pixels differ from the model", markup=False, soft_wrap=True)

@@ -72,4 +72,4 @@ def _photograph(simulation, path, console):
     with written_whole(path) as whole:
         save_picture(whole, frame.picture)
     height, width = frame.picture.shape[:2]
-    console.print(f"{path}: {width}x{height}, as the monitor shows it", markup=False)
+    console.print(f"{path}: {width}x{height}, as the monitor shows it", markup=False, soft_wrap=True)

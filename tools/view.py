@@ -118,4 +118,5 @@ def _show(board, compiled, order, poses, background, console):
         number += 1
     counters = board.wait()
     seconds = time.monotonic() - begin
-    console.print(f"{number} pictures in {seconds:.1f} s; the last in {counters['cycles']:,} cycles", markup=False)
+    console.print(f"{number} pictures in {seconds:.1f} s; the last in {counters['cycles']:,} cycles",
+                  markup=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""A whole board at its pins, at its own size: from power-up, a scene by the cable, to the decoded picture of its screen."""
+"""A whole board at its pins and its own size: from power-up, a scene over the cable, to what a monitor decodes."""
 
 from pathlib import Path
 

@@ -119,10 +119,14 @@ def test_a_reset_at_any_moment_is_noticed_and_mended(board, seed):
 
     link = Loader(Driver(Resetting(), clock=board.clock, timeout=0.005), SIMPLE, size=SIZE,
                   sleep=lambda seconds: board.run(500))
-    with pytest.raises((BoardReset, NoAnswer)):
+
+    def until_reset():
         while True:
             link.load(image)
             drawn(link, image, camera)
+
+    with pytest.raises((BoardReset, NoAnswer)):
+        until_reset()
     link = linked(board)
     link.load(image)
     drawn(link, image, camera)
