@@ -15,7 +15,7 @@ from .frame_reader import FrameReader
 from .line_buffer import LineBuffer, pixel_layout
 from .timing_generator import TimingGenerator, place_layout
 
-__all__ = ["BarScreen", "Display"]
+__all__ = ["BarScreen", "Display", "transmit"]
 
 #: Pixels between two clocks; the memory's :class:`~rtl.sdram.display_port.DisplayPort` holds many more.
 _CROSSING = 16
@@ -45,7 +45,7 @@ class BarScreen(wiring.Component):
         m.submodules.bars = DomainRenamer("pixel")(bars)
         m.submodules.dvi = dvi = DviTransmitter()
         m.d.comb += [bars.place.eq(timing.place), self.pairs.eq(dvi.pairs)]
-        _transmit(m, self._mode, timing.place, bars.color, dvi)
+        transmit(m, self._mode, timing.place, bars.color, dvi)
         return m
 
 
@@ -138,11 +138,11 @@ class Display(wiring.Component):
         color = Signal(24)
         m.d.comb += [lines.place.eq(timing.place), bars.place.eq(timing.place),
                      color.eq(Mux(tests, bars.color, lines.color)), self.pairs.eq(dvi.pairs)]
-        _transmit(m, mode, timing.place, color, dvi)
+        transmit(m, mode, timing.place, color, dvi)
         return m
 
 
-def _transmit(m, mode, place, color, dvi):
+def transmit(m, mode, place, color, dvi):
     """A colour that has the latency of :class:`ColorBars`, with the place it belongs to."""
     for stage in range(ColorBars.latency):
         before, place = place, Signal(place_layout(mode), name=f"place{stage}", reset_less=True)
