@@ -9,7 +9,7 @@ from .arithmetic import ARITHMETICS
 from .program.features import ShaderFeatures
 from .shader_program import shader_program, stack_words
 
-_EDGE_TOLERANCE = 8
+_EDGE_TOLERANCE = 16
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class ChipConfig:
         Which of :data:`~rtl.arithmetic.ARITHMETICS` it computes by.
     edge_tolerance : int
         By how much edges of triangles give, in units in the last place of what was added up: a power of two up to 64,
-        or 0 for none. Not with fused sums, whose products are not seen; so the default is 8, but none with these.
+        or 0 for none. Not with fused sums, whose products are not seen; so the default is 16, but none with these.
     num_pipelines : int
         Pipelines behind one ray generation controller, 1…4.
     shader : :class:`~rtl.program.features.ShaderFeatures`, optional

@@ -8,7 +8,7 @@ import numpy as np
 from .error import SceneError
 from .kdtree import build_kdtree
 from .srgb import encode
-from .triangles import unit_triangle_maps
+from .triangles import turned, unit_triangle_maps
 
 __all__ = ["INSTANCE_COST", "Part", "color_words", "make_part", "tree_over"]
 
@@ -34,7 +34,9 @@ class Part:
     ----------
     name : str
     corners : float64[T, 3, 3]
-        Of its triangles, members of the chip's format.
+        Of its triangles, members of the chip's format, as :func:`~sim.scene.triangles.turned` has them.
+    first : int8[T]
+        Which of each triangle's corners in its mesh comes first here.
     instance : int32[T]
         The scene's instance of each; −1 if the part is a mesh.
     prim : int32[T]
@@ -47,6 +49,7 @@ class Part:
 
     name: str
     corners: np.ndarray
+    first: np.ndarray
     instance: np.ndarray
     prim: np.ndarray
     material: np.ndarray
@@ -101,13 +104,13 @@ def make_part(name, corners, instance, prim, material, normal_scale, *, fmt, sta
     SceneError
         If a triangle's matrix does not fit the format.
     """
-    corners = fmt.quantize(corners)
+    corners, first = turned(fmt.quantize(corners))
     rows, centers, usable = unit_triangle_maps(corners, normal_scale=normal_scale)
     if not usable.all():
         warnings.append(f"mesh '{name}': {np.count_nonzero(~usable)} triangles dropped that have no area once their "
                         f"vertices are rounded to format {fmt}")
-    corners, instance, prim, material, rows, centers = (
-        array[usable] for array in (corners, instance, prim, material, rows, centers))
+    corners, first, instance, prim, material, rows, centers = (
+        array[usable] for array in (corners, first, instance, prim, material, rows, centers))
     if not len(corners):
         return None
     overflow = ~np.isfinite(fmt.quantize(rows)).all(axis=(1, 2))
@@ -118,4 +121,4 @@ def make_part(name, corners, instance, prim, material, normal_scale, *, fmt, sta
                          f"choose a format with more exponent bits ({overflow.sum()} such triangles)")
     tree = tree_over(corners.min(axis=1), corners.max(axis=1), triangles=corners, fmt=fmt, cost=_TRIANGLE_COST,
                      max_depth=stack_depth)
-    return Part(name, corners, instance, prim, material, rows, centers, tree)
+    return Part(name, corners, first, instance, prim, material, rows, centers, tree)
