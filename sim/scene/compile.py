@@ -85,7 +85,7 @@ class CompiledScene:
         self._spaces = []
         self._shown = []
         self._kept = {}
-        common = dict(fmt=fmt, stack_depth=stack_depth, warnings=self.warnings)
+        common = dict(fmt=fmt, stack_depth=stack_depth, warnings=self.warnings, solid=self._solid)
         if flatten:
             self.center, self.scale = unit_box(*scene.bounds())
             self._parts.append(self._flat_part(scene, common))
@@ -324,10 +324,10 @@ class CompiledScene:
         """What :func:`~.shading_image.shading_records` wants to know of a part's triangles."""
         part, numbers, scene = self._parts[number], first_matrix + np.arange(len(order)), self._scene
         if not self.is_flat:
-            return [(scene.meshes[number], numbers, part.prim[order], part.first[order], None)]
+            return [(scene.meshes[number], numbers, part.prim[order], part.first[order], part.sign[order], None)]
         of = part.instance[order]
-        return [(scene.meshes[placed.mesh], numbers[of == k], part.prim[order][of == k], part.first[order][of == k],
-                 placed.transform[:, :3])
+        return [(scene.meshes[placed.mesh], numbers[of == k],
+                 *(values[order][of == k] for values in (part.prim, part.first, part.sign)), placed.transform[:, :3])
                 for k, placed in enumerate(scene.instances)]
 
 
