@@ -78,7 +78,7 @@ class Top(wiring.Component):
             link.ready.eq(ready),
             system.start.eq(link.start),
             display.swap.eq(drawing & system.ready),
-            system.frame_base.eq(display.draw),
+            display.ready.eq(system.ready), system.frame_base.eq(display.draw),
             # Pixels go to the memory alone.
             system.pixel.ready.eq(1),
             self.pairs.eq(display.pairs),

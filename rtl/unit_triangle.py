@@ -4,14 +4,17 @@ from fpu import Datapath, Vector
 
 from .arithmetic import ARITHMETICS
 
-__all__ = ["MARGIN", "MAX_TOLERANCE", "REACH", "edge_errors", "edge_scales", "inside_edges", "unit_triangle"]
+__all__ = ["MARGIN", "MAX_MARGIN", "MAX_TOLERANCE", "REACH", "edge_errors", "edge_scales", "inside_edges",
+           "unit_triangle"]
 
 #: No edge gives by more, in u and v: seen so exactly from its edge that t is lost, a triangle would reach out.
-MAX_TOLERANCE = 2.0**-4
+MAX_TOLERANCE = 2.0**-3
 #: Part of t within which two soft hits are at one edge: where a ray grazes, that is how far apart rounding puts them.
 REACH = 2.0**-6
-#: Tolerances by which a hit that is inside by tolerance alone counts as farther than it is.
-MARGIN = 4
+#: Tolerances by which a hit that is inside by tolerance alone counts as farther than it is, times what t has lost.
+MARGIN = 1
+#: No soft hit counts as farther by a greater part of t.
+MAX_MARGIN = REACH / 2
 
 
 def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False, tolerant=False):
@@ -30,10 +33,11 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
 
     A hit by tolerance alone is soft, others are firm. Where a ray slips between two triangles, it is soft on both;
     where it passes an outline, on one, or on two of which one is seen from behind. So a soft hit is a ``hit`` if it is
-    within :data:`REACH` of the nearest soft one that was none, of a triangle seen from the same side (``soft_front``:
-    against its normal, ``soft_back``); else ``is_soft`` says if it is to be that one. And where triangles overlap by
+    within :data:`REACH` of the last soft one that was none, of a triangle seen from the same side (``soft_front``:
+    against its normal, ``soft_back``); else ``is_soft`` says that it is to be that one. And where triangles overlap by
     their tolerance, the one that is hit firmly is the one that is there: what counts is not t but ``key``, t and of a
-    soft hit a ``margin`` more, see :meth:`~fpu.graph.Graph.raised`. ``nearer`` is key < t_hit then, the nearest so far.
+    soft hit as much more as its t may be wrong, ``margin``·s(D′z)/|D′z| and at most :data:`MAX_MARGIN`, see
+    :meth:`~fpu.graph.Graph.raised`. ``nearer`` is key < t_hit then, the nearest so far; what is not is no ``is_soft``.
 
     Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator; if tolerant, two more,
     a few additions and comparisons of exponents, and additions of a constant to bits.
@@ -45,18 +49,21 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
     u = dp.add(origin.x, dp.mul(t, direction.x))
     v = dp.add(origin.y, dp.mul(t, direction.y))
     if tolerant:
-        errors = edge_errors(dp, t, direction, **edge_scales(dp))
+        scales = edge_scales(dp)
+        loss = dp.power_div(scales["direction_scale"].z, dp.power(direction.z))
+        errors = edge_errors(dp, t, direction, **scales)
         # A constant that needs no registers
         tolerance = dp.input("tolerance", delay=max(map(dp.arrival, errors)))
         inside = inside_edges(dp, u, v, [dp.power_mul(error, tolerance) for error in errors])
-        firm, later = _is_inside(dp, u, v), dp.raised(t, dp.input("margin", delay=dp.arrival(t)))
+        margin = dp.power_mul(loss, dp.input("margin", delay=dp.arrival(t)))
+        most = dp.const(MAX_MARGIN)
+        firm, later = _is_inside(dp, u, v), dp.raised(t, dp.select(dp.is_within(margin, most), margin, most))
         key = dp.select(firm, t, later)
         reach = dp.const(REACH)
         front, back = (dp.input(name, delay=dp.arrival(key)) for name in ("soft_front", "soft_back"))
         t_soft = dp.select(dp.sign(direction.z), back, front)
-        is_first = dp.gt(t_soft, dp.raised(t, reach))
-        is_pair = dp.logical_and(dp.logical_not(is_first), dp.le(t, dp.raised(t_soft, reach)))
-        soft = dp.logical_and(inside, dp.logical_not(firm), is_first)
+        is_pair = dp.logical_and(dp.le(t_soft, dp.raised(t, reach)), dp.le(t, dp.raised(t_soft, reach)))
+        soft = dp.logical_and(inside, dp.logical_not(firm), dp.logical_not(is_pair))
         inside = dp.logical_and(inside, dp.logical_or(firm, is_pair))
     else:
         inside = _is_inside(dp, u, v)
@@ -69,10 +76,11 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
     dp.output("u", u)
     dp.output("v", v)
     dp.output("hit", dp.logical_and(ahead, inside))
-    dp.output("nearer", dp.lt(key, t_hit))
+    nearer = dp.lt(key, t_hit)
+    dp.output("nearer", nearer)
     if tolerant:
         dp.output("key", key)
-        dp.output("is_soft", dp.logical_and(ahead, soft))
+        dp.output("is_soft", dp.logical_and(ahead, soft, nearer))
     return dp
 
 

@@ -187,7 +187,10 @@ class Controller(wiring.Component):
         with m.Else():
             m.d.sync += [levels.eq(Mux(was_column, Mux(last_column.write, Command.WRITE, Command.READ), Command.NOP)),
                          pins.a.eq(last_column.column << 1), pins.ba.eq(last_bank)]
-        m.d.sync += [pins.cke.eq(1), pins.cs_n.eq(0)]
+        # In a reset it stays as it is: low, the chip would go to sleep.
+        awake = Signal(reset_less=True)
+        m.d.sync += [awake.eq(1), pins.cs_n.eq(0)]
+        m.d.comb += pins.cke.eq(awake)
         return column, is_column
 
     def _move(self, m, column, is_column, banks):

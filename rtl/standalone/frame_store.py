@@ -12,8 +12,8 @@ __all__ = ["FrameStore"]
 class FrameStore(wiring.Component):
     """Keeps a picture, of each channel the highest bits, and shows each pixel as a square.
 
-    What is written in the domain ``sync`` is seen when the screen comes there next. Latency from a place to its colour 2
-    cycles of ``pixel``, throughput a pixel a cycle.
+    What is written in the domain ``sync`` is seen when the screen comes there next. Latency from a place to its colour
+    2 cycles of ``pixel``, throughput a pixel a cycle.
 
     Parameters
     ----------

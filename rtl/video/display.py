@@ -69,6 +69,7 @@ class Display(wiring.Component):
     Members
     -------
     test : the test picture instead
+    ready : the memory answers; lines that are late before the next frame do not count
     bases, swap, pending, shown, draw : see :class:`~.double_buffer.DoubleBuffer`
     frame, word : to and from the memory's :class:`~rtl.sdram.display_port.DisplayPort`
     frames, late : count frames shown, and lines that were late, since reset
@@ -83,6 +84,7 @@ class Display(wiring.Component):
         base_width = chip.word_width - PLACE_WIDTH
         super().__init__({
             "test": In(1),
+            "ready": In(1, init=1),
             "bases": In(base_width).array(2),
             "swap": In(1),
             "pending": Out(1),
@@ -124,7 +126,9 @@ class Display(wiring.Component):
             blanks.i.eq(timing.place.blank & ~was_blank),
             lates.i.eq(lines.late),
         ]
-        m.d.sync += [self.frames.eq(self.frames + blanks.o), self.late.eq(self.late + lates.o)]
+        begun = Signal()
+        m.d.sync += [begun.eq(begun | blanks.o & self.ready), self.frames.eq(self.frames + blanks.o),
+                     self.late.eq(self.late + (lates.o & begun))]
 
         m.d.comb += [
             *(base.eq(given) for base, given in zip(buffer.bases, self.bases, strict=True)),

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "Vcomponent.h"
@@ -53,7 +54,7 @@ struct Cable {
 struct Bench {
     VerilatedContext context;
     std::unique_ptr<Vcomponent> chip;
-    sdram::Chip memory;
+    std::optional<sdram::Chip> memory;
     Cable cable;
     // In picoseconds
     uint64_t sync_period, shift_period, next_sync = 0, next_shift = 0, shifts = 0, cycle = 0;
@@ -62,10 +63,10 @@ struct Bench {
     uint16_t in = 0, dq = 0;
     uint8_t* pairs = nullptr;
     uint64_t pairs_left = 0;
+    const sdram::Datasheet& sheet;
 
     Bench(int sheet, uint64_t sync_period, uint64_t shift_period, uint32_t divisor)
-        : memory(sdram::datasheets[sheet], double(sync_period) / 1000), cable{divisor},
-          sync_period(sync_period), shift_period(shift_period) {
+        : cable{divisor}, sync_period(sync_period), shift_period(shift_period), sheet(sdram::datasheets[sheet]) {
         chip = std::make_unique<Vcomponent>(&context);
         chip->rx = 1;
         reset(4);
@@ -73,7 +74,12 @@ struct Bench {
 
     ~Bench() { chip->final(); }
 
+    // The SDRAM is not reset, but not refreshed either, and rows stay open: as after power-up it must be initialised.
     void reset(int cycles) {
+        std::vector<uint16_t> contents;
+        if (memory) contents = std::move(memory->contents);
+        memory.emplace(sheet, double(sync_period) / 1000);
+        if (!contents.empty()) memory->contents = std::move(contents);
         chip->rst = chip->pixel_rst = chip->shift_rst = 1;
         for (int number = 0; number < cycles; ++number) tick();
         chip->rst = chip->pixel_rst = chip->shift_rst = 0;
@@ -101,7 +107,7 @@ struct Bench {
         chip->eval();
         cable.sense(chip->tx);
         in = dq;
-        dq = memory.edge(out);
+        dq = memory->edge(out);
         out = {bool(chip->pins_cke), bool(chip->pins_cs_n), bool(chip->pins_ras_n), bool(chip->pins_cas_n),
                bool(chip->pins_we_n), bool(chip->pins_dq_oe), chip->pins_ba, chip->pins_a, chip->pins_dqm,
                chip->pins_dq_o};
@@ -136,7 +142,7 @@ int32_t bench_run(Bench* bench, uint64_t cycles, int32_t until_byte) {
     try {
         for (uint64_t end = bench->cycle + cycles; bench->cycle < end;) {
             bench->tick();
-            if (bench->memory.violations) return VIOLATION;
+            if (bench->memory->violations) return VIOLATION;
             if (until_byte && !bench->cable.from_chip.empty()) break;
         }
     } catch (const AssertionFailed&) {
@@ -161,5 +167,5 @@ uint64_t bench_cycle(Bench* bench) { return bench->cycle; }
 
 uint32_t bench_lamps(Bench* bench) { return bench->chip->lamps; }
 
-const char* bench_violation(Bench* bench) { return bench->memory.first_violation.c_str(); }
+const char* bench_violation(Bench* bench) { return bench->memory->first_violation.c_str(); }
 }

@@ -55,8 +55,8 @@ def decode_pixels(pixels, image, config):
     is_hit = _field(pixels, layout["is_hit"].offset, 1) == 1
     triangle, instance = value("triangle")[is_hit], np.where(value("in_instance"), value("instance"), -1)[is_hit]
     frame.instance_id[is_hit], frame.prim_id[is_hit] = image.owners(triangle, instance)
-    for name in "tuv":
-        getattr(frame, name)[is_hit] = image.fmt.decode(value(name)[is_hit])
+    frame.t[is_hit], u, v = (image.fmt.decode(value(name)[is_hit]) for name in "tuv")
+    frame.u[is_hit], frame.v[is_hit] = image.weights(triangle, u, v)
     color = _field(pixels, layout["color"].offset, 24)
     for channel, shift in enumerate((16, 8, 0)):
         frame.color[..., channel] = color >> shift & 255

@@ -7,7 +7,7 @@ from rtl.affine_map import affine_map
 from rtl.arithmetic import ARITHMETICS
 from rtl.intersection import unit_triangle
 
-from ..scene.triangles import unit_triangle_maps
+from ..scene.triangles import turned, unit_triangle_maps
 from .method import Method
 from .parts import dot, named
 
@@ -30,7 +30,11 @@ def printed_map(fmt, *, latencies=None):
 
 
 def stored_matrix(corners):
-    """Rows and C of the scene compiler's matrices; NaN where there is none."""
+    """Rows and C of the scene compiler's matrices, of triangles as it turns them; NaN where there is none."""
+    return _matrix(turned(corners)[0])
+
+
+def _matrix(corners):
     rows, centers, usable = unit_triangle_maps(corners, normal_scale=1.0)
     rows[~usable] = np.nan
     stored = named("center", centers)
@@ -40,7 +44,7 @@ def stored_matrix(corners):
 
 
 def _stored_offset(corners):
-    stored = stored_matrix(corners)
+    stored = _matrix(corners)
     center = [stored.pop(f"center_{axis}") for axis in "xyz"]
     for row, axis in enumerate("xyz"):
         stored[f"offset_{axis}"] = -sum(stored[f"row{row}_{k}"] * c for k, c in zip("xyz", center, strict=True))

@@ -220,7 +220,8 @@ def render_full(image: SceneImage, camera, width, height, *, config, depth=4):
     frame.color[:] = colors
     is_hit = owners[..., 0] >= 0
     frame.instance_id[is_hit], frame.prim_id[is_hit] = image.owners(*owners[is_hit].T)
-    frame.t[is_hit], frame.u[is_hit], frame.v[is_hit], _ = hits[is_hit].T
+    frame.t[is_hit], u, v, _ = hits[is_hit].T
+    frame.u[is_hit], frame.v[is_hit] = image.weights(owners[is_hit][:, 0], u, v)
     sums, most = counts.sum(axis=0), counts.max(axis=0, initial=0)
     sums[-1] = most[-1]
     shader_sums = shader_counts.sum(axis=0)

@@ -112,7 +112,8 @@ def shade(image, hits, owners, background):
     is_hit = owners[..., 0] >= 0
     triangle, instance = owners[is_hit].T
     frame.instance_id[is_hit], frame.prim_id[is_hit] = image.owners(triangle, instance)
-    frame.t[is_hit], frame.u[is_hit], frame.v[is_hit], cosine = hits[is_hit].T
+    frame.t[is_hit], u, v, cosine = hits[is_hit].T
+    frame.u[is_hit], frame.v[is_hit] = image.weights(triangle, u, v)
     one = 1 << INTENSITY_BITS
     intensity = np.minimum(np.abs(cosine) * one, one).astype(np.uint32)
     words = image.shading[triangle]

@@ -85,7 +85,7 @@ class CompiledScene:
         self._spaces = []
         self._shown = []
         self._kept = {}
-        common = dict(fmt=fmt, stack_depth=stack_depth, warnings=self.warnings)
+        common = dict(fmt=fmt, stack_depth=stack_depth, warnings=self.warnings, solid=self._solid)
         if flatten:
             self.center, self.scale = unit_box(*scene.bounds())
             self._parts.append(self._flat_part(scene, common))
@@ -266,6 +266,7 @@ class CompiledScene:
             np.zeros(layout.static_entry, np.uint32)]
         matrices, shading = [np.zeros((count, 4, 3))], [np.zeros(count, np.uint32)]
         of_instance, of_prim = [np.full(count, -1, np.int32)], [np.full(count, -1, np.int32)]
+        firsts = [np.zeros(count, np.int8)]
         first_node, first_entry, first_matrix = layout.static_node, layout.static_entry, layout.static_matrix
         roots, shaded = {}, []
         for number, part in enumerate(self._parts):
@@ -288,6 +289,7 @@ class CompiledScene:
             shading.append(self._colors[part.material[order]])
             of_instance.append(part.instance[order])
             of_prim.append(part.prim[order])
+            firsts.append(part.first[order])
             first_node, first_entry, first_matrix = (
                 first_node + len(nodes), first_entry + len(entries), first_matrix + len(order))
         for slot in range(layout.num_slots):
@@ -304,6 +306,7 @@ class CompiledScene:
             fmt=fmt, root=0, nodes=nodes, lists=lists, matrices=pack_fields(fields, fmt.width),
             shading=np.concatenate(shading), num_instances=count, stack_depth=0,
             triangle_instance=np.concatenate(of_instance), triangle_prim=np.concatenate(of_prim),
+            triangle_first=np.concatenate(firsts),
             instance_ids=np.tile(np.array(self._shown, np.int32), layout.num_slots), center=np.zeros(3), scale=1.0,
             stats={"nodes": len(nodes), "list_entries": len(lists), "matrices": len(fields)})
         if not is_full:
@@ -321,9 +324,10 @@ class CompiledScene:
         """What :func:`~.shading_image.shading_records` wants to know of a part's triangles."""
         part, numbers, scene = self._parts[number], first_matrix + np.arange(len(order)), self._scene
         if not self.is_flat:
-            return [(scene.meshes[number], numbers, part.prim[order], None)]
+            return [(scene.meshes[number], numbers, part.prim[order], part.first[order], part.sign[order], None)]
         of = part.instance[order]
-        return [(scene.meshes[placed.mesh], numbers[of == k], part.prim[order][of == k], placed.transform[:, :3])
+        return [(scene.meshes[placed.mesh], numbers[of == k],
+                 *(values[order][of == k] for values in (part.prim, part.first, part.sign)), placed.transform[:, :3])
                 for k, placed in enumerate(scene.instances)]
 
 

@@ -31,7 +31,7 @@ from rtl.microcode import lane_width
 from rtl.program.features import ShaderFeatures
 
 from .kdtree import LEAF
-from .triangles import unpack_fields
+from .triangles import unpack_fields, weights
 
 __all__ = ["SceneImage", "describe", "tree_words"]
 
@@ -61,6 +61,8 @@ class SceneImage:
         Entries a traversal stack needs at most.
     triangle_instance, triangle_prim : int32[M]
         The triangle of each matrix; its instance is −1 if the chip tells it.
+    triangle_first : int8[M]
+        The corner of it, in its mesh, that is at u = v = 0.
     instance_ids : int32[num_instances]
         The scene's instance that is the chip's n-th.
     center : float64[3]
@@ -85,6 +87,7 @@ class SceneImage:
     stack_depth: int
     triangle_instance: np.ndarray
     triangle_prim: np.ndarray
+    triangle_first: np.ndarray
     instance_ids: np.ndarray
     center: np.ndarray
     scale: float
@@ -136,6 +139,10 @@ class SceneImage:
         known = self.triangle_instance[triangle]
         told = np.append(self.instance_ids, -1)[instance]
         return np.where(known >= 0, known, told), self.triangle_prim[triangle]
+
+    def weights(self, triangle, u, v):
+        """The weights of v1 and v2 in the mesh at the chip's u and v on its triangles."""
+        return weights(self.triangle_first[triangle], u, v)
 
     def matrix_values(self):
         """float64[M, 4, 3]: the three rows and C of each matrix."""

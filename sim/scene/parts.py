@@ -6,9 +6,10 @@ from functools import cached_property
 import numpy as np
 
 from .error import SceneError
+from .facing import facing
 from .kdtree import build_kdtree
 from .srgb import encode
-from .triangles import unit_triangle_maps
+from .triangles import turned, unit_triangle_maps
 
 __all__ = ["INSTANCE_COST", "Part", "color_words", "make_part", "tree_over"]
 
@@ -34,7 +35,11 @@ class Part:
     ----------
     name : str
     corners : float64[T, 3, 3]
-        Of its triangles, members of the chip's format.
+        Of its triangles, members of the chip's format, as :func:`~sim.scene.triangles.turned` has them.
+    first : int8[T]
+        Which of each triangle's corners in its mesh comes first here.
+    sign : int8[T]
+        −1 where the normal is turned, see :func:`~sim.scene.facing.facing`.
     instance : int32[T]
         The scene's instance of each; −1 if the part is a mesh.
     prim : int32[T]
@@ -47,6 +52,8 @@ class Part:
 
     name: str
     corners: np.ndarray
+    first: np.ndarray
+    sign: np.ndarray
     instance: np.ndarray
     prim: np.ndarray
     material: np.ndarray
@@ -74,7 +81,7 @@ def tree_over(lower, upper, *, fmt, cost, max_depth, triangles=None):
                         max_depth=max_depth)
 
 
-def make_part(name, corners, instance, prim, material, normal_scale, *, fmt, stack_depth, warnings):
+def make_part(name, corners, instance, prim, material, normal_scale, *, fmt, stack_depth, warnings, solid):
     """A part of triangles in coordinates of order 1.
 
     Parameters
@@ -90,6 +97,8 @@ def make_part(name, corners, instance, prim, material, normal_scale, *, fmt, sta
         Bound of its tree's depth.
     warnings : list of str
         Receives what was dropped.
+    solid : bool[M]
+        Materials whose sides do not differ: their triangles may face the other way.
 
     Returns
     -------
@@ -101,15 +110,17 @@ def make_part(name, corners, instance, prim, material, normal_scale, *, fmt, sta
     SceneError
         If a triangle's matrix does not fit the format.
     """
-    corners = fmt.quantize(corners)
+    corners, first = turned(fmt.quantize(corners))
     rows, centers, usable = unit_triangle_maps(corners, normal_scale=normal_scale)
     if not usable.all():
         warnings.append(f"mesh '{name}': {np.count_nonzero(~usable)} triangles dropped that have no area once their "
                         f"vertices are rounded to format {fmt}")
-    corners, instance, prim, material, rows, centers = (
-        array[usable] for array in (corners, instance, prim, material, rows, centers))
+    corners, first, instance, prim, material, rows, centers = (
+        array[usable] for array in (corners, first, instance, prim, material, rows, centers))
     if not len(corners):
         return None
+    sign = facing(corners, solid[material])
+    rows[:, 2] *= sign[:, None]
     overflow = ~np.isfinite(fmt.quantize(rows)).all(axis=(1, 2))
     if overflow.any():
         worst = np.flatnonzero(overflow)[0]
@@ -118,4 +129,4 @@ def make_part(name, corners, instance, prim, material, normal_scale, *, fmt, sta
                          f"choose a format with more exponent bits ({overflow.sum()} such triangles)")
     tree = tree_over(corners.min(axis=1), corners.max(axis=1), triangles=corners, fmt=fmt, cost=_TRIANGLE_COST,
                      max_depth=stack_depth)
-    return Part(name, corners, instance, prim, material, rows, centers, tree)
+    return Part(name, corners, first, sign, instance, prim, material, rows, centers, tree)

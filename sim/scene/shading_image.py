@@ -162,17 +162,20 @@ def _material(records, row, material, descriptor):
     records.integers(row, 11, [_packed((material.reflection, material.transmission, material.specular))])
 
 
-def _triangles(records, scene, rows, mesh, prim, linear, smooth_row, material_rows):
-    """Records of triangles ``prim`` of a mesh, brought into the chip's space by ``linear``, or None."""
+def _triangles(records, scene, rows, mesh, prim, first, sign, linear, smooth_row, material_rows):
+    """Records of triangles ``prim`` of a mesh, u = v = 0 at their corner ``first``, normals turned by ``sign``;
+    ``linear``, if not None, brings them into the chip's space."""
+    corner = (first[:, None] + np.arange(3)) % 3
     corners = mesh.vertices[mesh.triangles[prim]]
     turn = np.eye(3) if linear is None else np.linalg.inv(linear).T
     flat = flat_normals(corners) @ turn.T
-    flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+    flat *= sign[:, None] / np.linalg.norm(flat, axis=1, keepdims=True)
     records.floats(rows, 0, flat)
     has_uvs = mesh.uvs is not None
     records.integers(rows, 5, material_rows[mesh.material_ids[prim], int(has_uvs)][:, None])
     if has_uvs:
-        uvs = np.where(np.isfinite(mesh.uvs[prim]), mesh.uvs[prim], 0.0)
+        uvs = mesh.uvs[prim[:, None], corner]
+        uvs = np.where(np.isfinite(uvs), uvs, 0.0)
         # Whole numbers do not matter, and leave fewer bits to the rest.
         uvs = uvs - np.floor(uvs.min(axis=1, keepdims=True))
         records.floats(rows, 3, uvs[:, 1] - uvs[:, 0])
@@ -180,8 +183,8 @@ def _triangles(records, scene, rows, mesh, prim, linear, smooth_row, material_ro
         records.floats(rows, 9, uvs[:, 0])
     if smooth_row is None:
         return
-    normals = mesh.shading_normals[prim] @ turn.T
-    normals /= np.abs(turn).max()
+    normals = mesh.shading_normals[prim[:, None], corner] @ turn.T
+    normals *= sign[:, None, None] / np.abs(turn).max()
     smooth = np.arange(smooth_row, smooth_row + len(prim))
     records.integers(rows, 11, smooth[:, None])
     for k, column in enumerate((normals[:, 1] - normals[:, 0], normals[:, 2] - normals[:, 0], normals[:, 0])):
@@ -196,8 +199,9 @@ def shading_records(scene, image, *, parts, background, num_slots):
     scene : Scene
     image : SceneImage
         Its geometry.
-    parts : list of (Mesh, matrices, prims, linear)
-        Triangles: the numbers of their matrices, their numbers in the mesh, and the map to the chip's space without
+    parts : list of (Mesh, matrices, prims, firsts, signs, linear)
+        Triangles: the numbers of their matrices, their numbers in the mesh, their corners at u = v = 0, the signs of
+        their normals, and the map to the chip's space without
         its translation if they are in it, else None.
     background : tuple of int
         sRGB-encoded bytes.
@@ -215,7 +219,7 @@ def shading_records(scene, image, *, parts, background, num_slots):
     fmt, num_matrices = image.fmt, len(image.matrices)
     descriptors, sky, texels = pack_textures([material.texture for material in scene.materials], scene.sky)
     smooth = [mesh.normals is not None for mesh, *_ in parts]
-    num_smooth = sum(len(prim) for (_, _, prim, _), has in zip(parts, smooth, strict=True) if has)
+    num_smooth = sum(len(prim) for (_, _, prim, *_), has in zip(parts, smooth, strict=True) if has)
     first_material = FIRST_MATRIX + num_matrices
     first_light = first_material + 2 * len(scene.materials)
     first_smooth = first_light + num_slots * num_lights(scene)
@@ -231,8 +235,9 @@ def shading_records(scene, image, *, parts, background, num_slots):
         _material(records, material_rows[number, 0], material, None)
         _material(records, material_rows[number, 1], material, descriptors[number])
     row = first_smooth
-    for (mesh, matrices, prim, linear), has_normals in zip(parts, smooth, strict=True):
-        _triangles(records, scene, FIRST_MATRIX + matrices, mesh, prim, linear, row if has_normals else None,
+    for (mesh, matrices, prim, first, sign, linear), has_normals in zip(parts, smooth, strict=True):
+        _triangles(records, scene, FIRST_MATRIX + matrices, mesh, prim, first, sign, linear,
+                   row if has_normals else None,
                    material_rows)
         row += len(prim) if has_normals else 0
     return records.fields, texels, first_light

@@ -2,7 +2,38 @@
 
 import numpy as np
 
-__all__ = ["pack_fields", "unit_triangle_maps", "unpack_fields"]
+__all__ = ["pack_fields", "turned", "unit_triangle_maps", "unpack_fields", "weights"]
+
+
+def turned(corners):
+    """Triangles turned so that their longest edge lies across from C, and what their maps see of it.
+
+    Of the three edges that is the one of which no coordinate of the unit triangle is the distance: it is u + v = 1, and
+    what is known of u + v is what is known of u and of v. These are distances in units of the triangle's heights over
+    the two other edges, so it is known well if the height over the third is the least.
+
+    Parameters
+    ----------
+    corners : float64[T, 3, 3]
+        v0, v1, v2 of each triangle.
+
+    Returns
+    -------
+    corners : float64[T, 3, 3]
+        The same, beginning with another, and as they go round.
+    first : int8[T]
+        The one that they begin with; 0 where edges are equally long.
+    """
+    across = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    first = np.einsum("tij,tij->ti", across, across).argmax(axis=1)
+    order = (first[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(corners, order[:, :, None], axis=1), first.astype(np.int8)
+
+
+def weights(first, u, v):
+    """The weights of v1 and v2 by those of a turned triangle's second and third corner: float64[N] each."""
+    third = 1 - u - v
+    return np.choose(first, (u, third, v)), np.choose(first, (v, u, third))
 
 
 def unit_triangle_maps(corners, *, normal_scale):

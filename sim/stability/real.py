@@ -128,7 +128,8 @@ class SceneEdges:
     def measure(self, kind, count, rng):
         """The :class:`Count` of up to ``count`` rays at what ``kind``, one of :data:`KINDS`, says.
 
-        A ray whose answer is not golden's within the slack is judged by nine, see :mod:`sim.stability.truth`.
+        A ray whose answer is not golden's within the slack is judged by ten, see :mod:`sim.stability.truth`.
+        No failure is that of one that begins on a surface, as far as its origin is known.
         """
         points, ways = self._aimed(kind, count, rng)
         origins = points + ways * rng.uniform(*_DISTANCES, (len(points), 1)) * self._half_extent
@@ -143,7 +144,11 @@ class SceneEdges:
         doubtful = np.flatnonzero(~(is_near | (np.isinf(answers.t) & np.isinf(known.t))) | answers.is_odd)
         if not len(doubtful):
             return Count(rays=whole)
-        truth = truth_of(self._corners, origins[doubtful], directions[doubtful], fmt=self._fmt)
+        truth = truth_of(self._corners, origins[doubtful], directions[doubtful], fmt=self._fmt,
+                         answered=answers.triangle[doubtful])
+        # What begins within half a unit in the last place of a surface may begin on either side of it.
+        begins = truth.farthest * np.linalg.norm(directions[doubtful], axis=1) <= (
+            2.0 ** -(self._fmt.frac_width + 1) * np.abs(origins[doubtful]).max(axis=1))
         verdict = judge(answers.of(doubtful), truth)
-        return Count(whole, *(int(np.count_nonzero(getattr(verdict, f"is_{kind}")))
+        return Count(whole, *(int(np.count_nonzero(getattr(verdict, f"is_{kind}") & ~begins))
                               for kind in ("crack", "phantom", "distance", "odd")))

@@ -11,6 +11,9 @@ through the vertices as the method had them, in the format. So
 
 Nearer and farther is what t is by more than ``BLUR`` units in the last place.
 
+Nine do not see all that is near: past the tip of a spike that reaches in between them they go by. Where it matters, a
+tenth stands for it, turned to the triangle that was answered if that is within the angle.
+
 A miss counts as farthest of all: where some of the nine hit and some do not, at an outline, a miss is right, and so is
 what lies behind the nearest.
 """
@@ -46,7 +49,7 @@ class Truth:
     ----------
     nearest, farthest : float64[N]
         t of the nearest and of the farthest; inf for a miss.
-    triangles : int32[9, N]
+    triangles : int32[9 or 10, N]
         What each hits, −1 for none.
     slack : float
         Relative error that t may have besides.
@@ -88,7 +91,30 @@ def _round(directions, angle):
     return np.concatenate([directions[None], moved])
 
 
-def truth_of(corners, origins, directions, *, fmt, excluded=None, to_mesh=None):
+def _turned_to(corners, origins, directions, angle):
+    """float64[N, 3]: directions turned to the nearest points of triangles float64[N, 3, 3] if within ``angle``."""
+    length = np.linalg.norm(directions, axis=1, keepdims=True)
+    ahead = directions / length
+    side = np.cross(ahead, np.eye(3)[np.abs(ahead).argmin(axis=1)])
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    places = corners - origins[:, None]
+    depth = np.einsum("nij,nj->ni", places, ahead)
+    with np.errstate(all="ignore"):
+        # As the ray sees them, itself at 0.
+        seen = np.stack([np.einsum("nij,nj->ni", places, axis) for axis in (side, np.cross(ahead, side))], axis=2)
+        seen /= depth[:, :, None]
+        edges = np.roll(seen, -1, axis=1) - seen
+        along = np.clip(-(seen * edges).sum(axis=2) / (edges**2).sum(axis=2), 0, 1)
+        feet = seen + along[:, :, None] * edges
+        nearest = feet[np.arange(len(feet)), (feet**2).sum(axis=2).argmin(axis=1)]
+        # A little further, to be inside in float64.
+        nearest += 2.0**-30 * (seen.mean(axis=1) - nearest)
+        turns = (depth > 0).all(axis=1) & (np.hypot(*nearest.T) <= angle)
+    nearest = np.where(turns[:, None], nearest, 0.0)
+    return directions + length * (nearest[:, :1] * side + nearest[:, 1:] * np.cross(ahead, side))
+
+
+def truth_of(corners, origins, directions, *, fmt, excluded=None, to_mesh=None, answered=None):
     """The :class:`Truth` of rays.
 
     Parameters
@@ -103,9 +129,13 @@ def truth_of(corners, origins, directions, *, fmt, excluded=None, to_mesh=None):
         A triangle that each ray does not hit.
     to_mesh : callable, optional
         Maps (origins, directions) to where the triangles are.
+    answered : int[N], optional
+        Triangles to which a tenth ray is turned, −1 for none; not with ``to_mesh``.
     """
     blur = BLUR * 2.0 ** -fmt.frac_width
-    directions = _round(directions, blur)
+    tenth = () if answered is None else (np.where(
+        (answered >= 0)[:, None], _turned_to(corners[answered], origins, directions, blur), directions)[None],)
+    directions = np.concatenate([_round(directions, blur), *tenth])
     origins = np.broadcast_to(origins, directions.shape)
     if to_mesh is not None:
         origins, directions = to_mesh(origins, directions)

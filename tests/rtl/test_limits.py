@@ -9,7 +9,7 @@ import pytest
 from fpu import FloatFormat
 from rtl.intersection import Intersection
 from rtl.layout import PACKET_RAYS
-from rtl.unit_triangle import MARGIN, MAX_TOLERANCE, REACH
+from rtl.unit_triangle import MARGIN, MAX_MARGIN, MAX_TOLERANCE, REACH
 from tests.bench import drain, feed, simulate
 from tests.rtl.packets import fields, random_token, rays_of
 from tests.rtl.rounded import Rounded, same
@@ -21,6 +21,10 @@ STACK_DEPTH, INDEX_WIDTH = 3, 8
 #: Triangle that a ray has hit that has hit none; instance of a triangle that is in none.
 NONE = (1 << INDEX_WIDTH) - 1
 NUM_TRIANGLES = 3
+
+
+def power(value):
+    return 2.0 ** math.floor(math.log2(abs(value))) if value else 0.0
 
 
 class World:
@@ -84,11 +88,13 @@ class World:
             times = rng.choice([1.0, 1.0, 2.0, 4 / 3, 0.5, 0.25, -1.0])
             direction = [self.arithmetic.round(times * (end - begin))
                          for end, begin in zip(target, origin, strict=True)]
+            loss = rng.choice([0.0, 0.5, 1.0, 4.0])
+            lost = [0, 0, FMT.bias + int(math.log2(loss * power(direction[2])))] if loss else [0, 0, 0]
             self.vectors.append(packet | {"is_origin": 0, "ray": ray, "first": int(ray == numbers[0]),
                                           "last": int(ray == numbers[-1]),
-                                          **({"scale": [0, 0, 0]} if self.tolerance else {}),
+                                          **({"scale": lost} if self.tolerance else {}),
                                           "vector": dict(zip("xyz", direction, strict=True))})
-            self.keep(thread, ray, index, instance, solid, origin, direction, token["level"], scales)
+            self.keep(thread, ray, index, instance, solid, origin, direction, token["level"], scales, loss)
         self.expected[thread] = token | {"hit": sum(1 << ray for ray in records)}
 
     @staticmethod
@@ -96,32 +102,37 @@ class World:
         """So many units in the last place farther."""
         return float(FMT.decode(FMT.encode(t) + units)) if 0 < t < math.inf else t
 
-    def join(self, thread, ray, t, direction):
+    def join(self, thread, ray, t, key, direction):
         """Whether a soft hit finds one that waits for it; else it may wait itself."""
         is_back, reach = math.copysign(1, direction[2]) < 0, int(REACH * 2**FMT.frac_width)
         waiting = self.soft[thread].get((ray, is_back), math.inf)
-        if waiting <= self.raised(t, reach):
-            joins = t <= self.raised(waiting, reach)
-            self.events["joined" if joins else "alone and behind"] += 1
-            return joins
+        if waiting <= self.raised(t, reach) and t <= self.raised(waiting, reach):
+            self.events["joined"] += 1
+            return True
+        if not key < self.records[thread].get(ray, {}).get("key", math.inf):
+            self.events["alone and too far"] += 1
+            return False
         self.events["waits"] += 1
+        self.events["waits behind"] += waiting < t
         self.events["of another side"] += (ray, not is_back) in self.soft[thread]
         self.soft[thread][ray, is_back] = t
         if ray not in self.records[thread]:
             self.records[thread][ray] = {"key": math.inf, "triangle": NONE}
         return False
 
-    def keep(self, thread, ray, index, instance, solid, origin, direction, level, scales):
+    def keep(self, thread, ray, index, instance, solid, origin, direction, level, scales, loss):
         limits, records, events = self.rays[thread][ray], self.records[thread], self.events
         t, u, v, _ = reference_test(self.arithmetic, origin, direction)
         kept, total = records.get(ray, {}).get("key", math.inf), self.arithmetic.add(u, v)
-        edges = [min(self.tolerance * 2.0 ** (scale - FMT.bias - FMT.frac_width), MAX_TOLERANCE) if scale else 0.0
-                 for scale in scales[:2]]
+        errors = [max(2.0 ** (scale - FMT.bias) if scale else 0.0, power(self.arithmetic.mul(t, way)) * loss)
+                  for scale, way in zip(scales, direction[:2], strict=False)]
+        edges = [min(self.tolerance * error * 2.0**-FMT.frac_width, MAX_TOLERANCE) for error in errors]
         is_firm = u >= 0 and v >= 0 and total <= 1
         is_soft = not is_firm and self.tolerance and all(
             x >= 0 or -x < edge for x, edge in zip((u, v), edges, strict=True)) and (
             total <= 1 or total < 1 + max(edges))
-        key = self.raised(t, MARGIN * self.tolerance) if is_soft else t
+        later = int(min(MARGIN * self.tolerance * loss, MAX_MARGIN * 2**FMT.frac_width))
+        key = self.raised(t, later) if is_soft else t
         if not ((is_firm or is_soft) and t < math.inf):
             events["beside"] += 1
         elif not (limits["t_near"] if self.near else 0) < t:
@@ -129,7 +140,7 @@ class World:
             events["just too near"] += t == limits["t_near"] > 0
         elif (index, instance) == (limits["triangle"], limits["instance"]):
             events["excluded inside of an instance" if level else "excluded"] += 1
-        elif is_soft and not self.join(thread, ray, t, direction):
+        elif is_soft and not self.join(thread, ray, t, key, direction):
             pass
         elif not key < kept:
             events["over" if kept == 0 else "as far" if key == kept else "too far"] += 1
@@ -213,7 +224,8 @@ def test_limits(seed, num_threads, gap, near, tolerance):
     assert min(events["too near"], events["just too near"]) > 2 if near else not events["too near"]
     assert num_records[0] > 200
     if tolerance:
-        assert min(events[event] for event in ("of another side", "joined", "alone and behind", "waits")) > 0
+        assert min(events[event] for event in ("of another side", "joined", "alone and too far", "waits",
+                                              "waits behind")) > 0
 
 
 def log_accepted(dut, accepted):

@@ -8,7 +8,7 @@ import pytest
 from fpu import FloatFormat
 from rtl.affine_map import affine_map
 from rtl.arithmetic import ARITHMETICS
-from rtl.unit_triangle import MARGIN, MAX_TOLERANCE, REACH, unit_triangle
+from rtl.unit_triangle import MARGIN, MAX_MARGIN, MAX_TOLERANCE, REACH, unit_triangle
 
 FMT = FloatFormat(7, 16)
 COUNT = 3000
@@ -76,7 +76,7 @@ def test_edges_give_by_what_was_lost(ulp):
         t_soft = FMT.quantize(np.abs(t) * (1 + rng.choice([-1.5, -0.9, 0, 0.9, 1.5], COUNT) * REACH))
         tolerant[name] = np.where(rng.random(COUNT) < 0.3, np.inf, t_soft)
     plain, found = unit_triangle(FMT).model(**inputs), unit_triangle(FMT, tolerant=True).model(**tolerant)
-    hits = beaten = waits = 0
+    hits = beaten = waits = waits_behind = capped = 0
     for i in range(COUNT):
         u, v, t = (float(plain[name][i]) for name in ("u", "v", "t"))
         assert (u, v, t) == tuple(float(found[name][i]) for name in ("u", "v", "t"))
@@ -88,11 +88,14 @@ def test_edges_give_by_what_was_lost(ulp):
         inside &= total <= 1 or total < 1 + max(limits)
         is_firm, ahead = u >= 0 and v >= 0 and total <= 1, 0 < t < np.inf
         waiting = float(tolerant["soft_back" if math.copysign(1, direction[i, 2]) < 0 else "soft_front"][i])
-        later, reach = raised(t, MARGIN * ulp), int(REACH * 2**16)
+        later, reach = raised(t, int(min(MARGIN * ulp * loss, MAX_MARGIN * 2**16))), int(REACH * 2**16)
         pairs = waiting <= raised(t, reach) and t <= raised(waiting, reach)
         assert bool(found["hit"][i]) == (inside and ahead and (is_firm or pairs))
-        assert bool(found["is_soft"][i]) == (inside and ahead and not is_firm and waiting > raised(t, reach))
+        is_nearer = (t if is_firm else later) < tolerant["t_hit"][i]
+        assert bool(found["is_soft"][i]) == (inside and ahead and not is_firm and not pairs and is_nearer)
         waits += bool(found["is_soft"][i])
+        waits_behind += bool(found["is_soft"][i]) and waiting < t
+        capped += not is_firm and MARGIN * ulp * loss > MAX_MARGIN * 2**16
         hits += bool(found["hit"][i]) and not plain["hit"][i]
         # A hit by tolerance alone has to be nearer by the margin.
         key = t if is_firm else later
@@ -104,3 +107,5 @@ def test_edges_give_by_what_was_lost(ulp):
     assert hits > COUNT / 200
     assert beaten > COUNT / 20
     assert waits > COUNT / 200
+    assert waits_behind > 0
+    assert (capped > 0) == (ulp == 64)

@@ -10,6 +10,8 @@ from sim.methods import METHODS, closest_hits, near_pairs
 from sim.methods.closest import Pairs
 from sim.methods.method import built
 from sim.methods.tolerant import scaled_map, tolerant
+from sim.methods.unit_triangle import stored_matrix
+from sim.scene.triangles import turned, weights
 from tests.triangles import aimed_rays
 
 FINE, FMT = FloatFormat(8, 23), FloatFormat(7, 16)
@@ -30,7 +32,8 @@ def test_well_conditioned(method, rays):
     inside = exact[3]
     assert (found.hit[clear] == inside[clear]).all()
     assert not found.is_soft[clear].any()
-    for value, wanted in zip(found[:3], exact[:3], strict=True):
+    first = turned(corners)[1] if method.stored is stored_matrix else np.zeros(len(corners), np.int8)
+    for value, wanted in zip((found.t, *weights(first, found.u, found.v)), exact[:3], strict=True):
         assert value[clear & inside] == pytest.approx(wanted[clear & inside], abs=3e-4)
 
 
@@ -60,7 +63,7 @@ def test_the_largest_product():
 
 
 @pytest.mark.parametrize(("ulp", "options", "message"), [
-    (3, {}, r"^Tolerance and cap must be powers of two, not 3 and 0\.0625$"),
+    (3, {}, r"^Tolerance and cap must be powers of two, not 3 and 0\.125$"),
     (4, {"cap": 0.3}, r"^Tolerance and cap must be powers of two, not 4 and 0\.3$"),
     (4, {"bound": "none"}, "^Bound must be one of full, products, terms, not 'none'$")])
 def test_bad_tolerances(ulp, options, message):
@@ -69,13 +72,13 @@ def test_bad_tolerances(ulp, options, message):
 
 
 @pytest.mark.parametrize(("method", "reach"), [
-    (METHODS["firm edges"], 1), (METHODS["default"], 8), (tolerant(2), 2), (tolerant(8, bound="full"), 8),
-    (tolerant(8, bound="products"), 8), (tolerant(8, bound="terms"), 8), (tolerant(2.0**14), 2**12),
+    (METHODS["firm edges"], 1), (METHODS["default"], 16), (tolerant(2), 2), (tolerant(8, bound="full"), 8),
+    (tolerant(8, bound="products"), 8), (tolerant(8, bound="terms"), 8), (tolerant(2.0**14), 2**13),
     (tolerant(2.0**14, bound="terms", cap=2.0**-10), 2**6)])
 def test_tolerance_widens_by_what_it_says(method, reach):
     """Rays that meet the plane a few units in the last place beyond an edge; all terms are 1 there, but for the cap."""
     corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, 1, 0)]])
-    off = np.array([0, 1, 2, 3, 7, 8, 9, 63, 64, 1023, 1024, 5000])
+    off = np.array([0, 1, 2, 3, 7, 8, 9, 15, 16, 63, 64, 1023, 1024, 5000, 8191, 8192])
     distance = off * 2.0**-16
     stored, _ = method.store(FMT, corners)
     for origins in (np.stack([-1 - distance, np.full(len(off), 0.25), np.ones(len(off))], axis=1),

@@ -84,12 +84,17 @@ def test_triangles_and_materials():
                      ball((0, 0, 3), 0.5, plain, smooth=True, num_rings=6))
     image, floats, integers = lanes(scene)
     assert image.records.shape[1] == 12 * lane_width(FORMAT) // 32
+    signs = set()
     for matrix in range(len(image.matrices)):
         row = FIRST_MATRIX + matrix
         part, prim = image.triangle_instance[matrix], image.triangle_prim[matrix]
         mesh = scene.meshes[part]
         corners = mesh.vertices[mesh.triangles[prim]]
         normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        # Turned as it is in the matrix, and all that is on corners begins where the matrix does.
+        sign = np.sign(image.matrix_values()[matrix, 2] @ normal)
+        signs.add((part, int(sign)))
+        normal, order = sign * normal, (image.triangle_first[matrix] + np.arange(3)) % 3
         assert floats[row, :3] == pytest.approx(normal / np.linalg.norm(normal), abs=2e-5)
         material = integers[integers[row, 5]]
         color = [linear_colors()[255], linear_colors()[188], 0] if part in (0, 3) else [COLOR_ONE] * 3
@@ -98,21 +103,24 @@ def test_triangles_and_materials():
         assert (material[3] >> MaterialFlag.TEXTURED & 1) == (part == 1)
         assert (integers[row, 11] > 0) == (part == 3)
         if part == 1:
-            uvs = mesh.uvs[prim]
+            uvs = mesh.uvs[prim][order]
             assert floats[row, 9:11].tolist() == uvs[0].tolist()
             assert floats[row, 3:5].tolist() == (uvs[1] - uvs[0]).tolist()
             assert floats[row, 6:8].tolist() == (uvs[2] - uvs[0]).tolist()
         if part == 3:
             columns = floats[integers[row, 11]]
-            n0, n1, n2 = mesh.shading_normals[prim]
+            n0, n1, n2 = sign * mesh.shading_normals[prim][order]
             assert columns[:9] == pytest.approx(np.concatenate([n1 - n0, n2 - n0, n0]), abs=2e-5)
+    assert {sign for _, sign in signs} == {1, -1}
+    assert len([sign for part, sign in signs if part == 3]) == 1
 
 
 def test_whole_numbers_are_taken_off_texture_coordinates():
     material = Material("m", (1, 1, 1), Texture("t", np.zeros((2, 2, 4), np.uint8)))
     scene = scene_of(quad(CORNERS, material, uvs=[(1000.25, -7.5), (1001.25, -7.5), (1001.25, -6.5), (1000.25, -6.5)]))
     _, floats, _ = lanes(scene)
-    assert floats[FIRST_MATRIX:FIRST_MATRIX + 2, 9:11].tolist() == [[0.25, 0.5], [0.25, 0.5]]
+    # At the corners across from the diagonal
+    assert sorted(floats[FIRST_MATRIX:FIRST_MATRIX + 2, 9:11].tolist()) == [[0.25, 1.5], [1.25, 0.5]]
 
 
 def test_flags_of_materials():

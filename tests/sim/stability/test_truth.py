@@ -7,7 +7,7 @@ from fpu import FloatFormat
 from sim.methods import METHODS, Answers
 from sim.stability.cases import CASES, Case, limits_of
 from sim.stability.probe import Probe, rounded_rays
-from sim.stability.truth import BLUR, judge, truth_of
+from sim.stability.truth import BLUR, _turned_to, judge, truth_of
 from tests.sim.methods.test_methods import exact_hit
 
 FMT = FloatFormat(7, 16)
@@ -47,6 +47,42 @@ def test_verdicts(x, t, triangle, kind):
     kinds = "is_crack", "is_phantom", "is_distance", "is_odd"
     assert [name for name in kinds if getattr(verdict, name)] == ([kind] if kind else [])
     assert verdict.is_failure.item() == (kind is not None)
+
+
+@pytest.mark.parametrize(("gap", "answered", "is_phantom"), [
+    (0.3, 0, False), (0.9, 0, False), (1.1, 0, True), (0.3, -1, True), (0.3, None, True), (0.3, 1, True)])
+def test_a_tenth_ray_finds_the_tip_of_a_spike(gap, answered, is_phantom):
+    """Between the eight, which are 45° apart, comes in a spike of a hundredth of the angle's width."""
+    turn = np.radians(22.5)
+    along, aside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
+    tip = gap * ANGLE * along
+    spike = np.stack([tip, tip + along + 1e-2 * ANGLE * aside, tip + along - 1e-2 * ANGLE * aside])
+    corners = np.concatenate([spike[None], LOWER])
+    truth = truth_of(corners, np.array([(0.0, 0, 1)]), DOWN, fmt=FMT,
+                     answered=None if answered is None else np.array([answered]))
+    assert len(truth.triangles) == (9 if answered is None else 10)
+    verdict = judge(Answers(np.array([1.0]), np.array([0]), np.zeros(1, bool)), truth)
+    assert verdict.is_phantom.item() == is_phantom
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tenth_ray_is_within_the_angle_and_meets_its_triangle(seed):
+    """In fractions; where it is not turned, no corner is within the angle."""
+    rng = np.random.default_rng(seed)
+    count = 200
+    corners = rng.normal(size=(count, 3, 3))
+    origins = rng.normal(size=(count, 3)) * 3
+    near = np.einsum("ni,nij->nj", rng.dirichlet((0.3, 0.3, 0.3), count), corners)
+    directions = near - origins + 1.5 * ANGLE * rng.normal(size=(count, 3))
+    truth = truth_of(corners, origins, directions, fmt=FMT, answered=np.arange(count))
+    turned = _turned_to(corners, origins, directions, ANGLE)
+    moved = np.linalg.norm(turned - directions, axis=1) / np.linalg.norm(directions, axis=1)
+    is_turned = moved > 0
+    assert 20 < is_turned.sum()
+    assert moved.max() <= ANGLE * (1 + 1e-9)
+    hits = [exact_hit(corners[i], origins[i], turned[i]) is not None for i in np.flatnonzero(is_turned)]
+    assert all(hits)
+    assert truth.triangles.shape == (10, count)
 
 
 def test_what_is_odd_fails():
