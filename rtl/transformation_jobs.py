@@ -128,6 +128,7 @@ class TransformationJobs(wiring.Component):
             about.last.eq(last),
             about.ray.eq(ray),
             *(self.vector[name].eq(current[name]) for name in ("matrix", *self._screen)),
+            self.vector_address.valid.eq(active & (current.kind != Kind.STEP) & (current.kind != Kind.CAMERA)),
             self.vector_address.thread.eq(token.thread),
             self.vector_address.level.eq(token.level),
             self.vector_address.is_origin.eq(origin_next),
