@@ -107,17 +107,19 @@ class TransformationJobs(wiring.Component):
             m.d.sync += [remaining.eq(others), origin_next.eq(~shared), first.eq(0),
                          last.eq(shared & others.any() & ~(others & (others - 1)).any())]
         with m.If(moves):
-            m.d.sync += [current.eq(following), stores.eq(following_stores), active.eq(1), has_following.eq(0),
-                         remaining.eq(mask), origin_next.eq(has_origin), last.eq(~has_origin), first.eq(1)]
+            m.d.sync += [current.eq(following), stores.eq(following_stores), active.eq(1), remaining.eq(mask),
+                         origin_next.eq(has_origin), last.eq(~has_origin), first.eq(1)]
 
         def take(kind, rays, *, to_store, origin=1):
-            m.d.sync += [has_following.eq(1), following.kind.eq(kind), mask.eq(rays), has_origin.eq(origin),
-                         following_stores.eq(to_store)]
+            m.d.sync += [following.kind.eq(kind), mask.eq(rays), has_origin.eq(origin), following_stores.eq(to_store)]
 
+        # Where there is room something is put, whether it is there or not: many a bit waits for who it is.
         if has_shader:
-            self._take_step(m, following, room, Mux(has_following, following_stores, lately), take)
+            comes = self._take_step(m, following, room, Mux(has_following, following_stores, lately), take)
         else:
-            self._take_primary(m, following, room, take)
+            comes = self._take_primary(m, following, room, take)
+        with m.If(room):
+            m.d.sync += has_following.eq(comes)
 
         token, about = current.job.token, self.vector.about
         m.d.comb += [
@@ -141,24 +143,28 @@ class TransformationJobs(wiring.Component):
         return m
 
     def _take_primary(self, m, following, room, take):
-        """Takes a packet to make before one to transform."""
+        """Takes a packet to make before one to transform; returns whether there is any."""
         m.d.comb += [
             self.primary.ready.eq(room),
             self.matrix.ready.eq(room & ~self.primary.valid),
         ]
-        with m.If(room & self.primary.valid):
-            take(Kind.CAMERA, self.primary.payload.token.mask, to_store=1)
-            m.d.sync += [
-                following.job.token.eq(self.primary.payload.token),
-                following.matrix.rows.eq(self.camera.rows),
-                following.x.eq(self.primary.payload.x),
-                following.y.eq(self.primary.payload.y),
-            ]
-        with m.Elif(room & self.matrix.valid):
+        with m.If(room):
             self._take_matrix(m, following, take)
+            with m.If(self.primary.valid):
+                take(Kind.CAMERA, self.primary.payload.token.mask, to_store=1)
+                m.d.sync += [
+                    following.job.token.eq(self.primary.payload.token),
+                    following.matrix.rows.eq(self.camera.rows),
+                    following.x.eq(self.primary.payload.x),
+                    following.y.eq(self.primary.payload.y),
+                ]
+        return self.primary.valid | self.matrix.valid
 
     def _take_step(self, m, following, room, after_store, take):
-        """Takes a vector of the shader before a packet to transform, unless that one would have to wait."""
+        """Takes a vector of the shader before a packet to transform, unless that vector would have to wait.
+
+        Returns whether there is any.
+        """
         matrix, step = self.matrix.payload, self.step.payload
         m.submodules.origins = origins = memory.Memory(shape=1, depth=1 << thread_width(self._num_threads), init=[])
         write, read = origins.write_port(), origins.read_port(domain="comb")
@@ -173,19 +179,18 @@ class TransformationJobs(wiring.Component):
             write.en.eq(self.shared.valid),
             read.addr.eq(matrix.payload.token.thread),
         ]
-        with m.If(room & is_step):
-            take(Kind.STEP, 1 << step.ray, to_store=stores, origin=0)
-            m.d.sync += [
-                following.job.token.thread.eq(step.thread),
-                following.tag.eq(step.tag),
-                following.store.eq(step.store),
-                following.matrix.rows.eq(step.rows),
-                # No point is mapped, so its place is free.
-                following.matrix.center.eq(step.vector),
-            ]
-        with m.Elif(room & self.matrix.valid):
+        with m.If(room):
             self._take_matrix(m, following, take)
-            m.d.sync += following.shared.eq(read.data)
+            m.d.sync += [following.shared.eq(read.data), following.tag.eq(step.tag), following.store.eq(step.store)]
+            with m.If(is_step):
+                take(Kind.STEP, 1 << step.ray, to_store=stores, origin=0)
+                m.d.sync += [
+                    following.job.token.thread.eq(step.thread),
+                    following.matrix.rows.eq(step.rows),
+                    # No point is mapped, so its place is free.
+                    following.matrix.center.eq(step.vector),
+                ]
+        return self.step.valid | self.matrix.valid
 
     def _take_matrix(self, m, following, take):
         matrix = self.matrix.payload
