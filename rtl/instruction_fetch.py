@@ -111,6 +111,7 @@ class InstructionFetch(wiring.Component):
                          decoded.eq(taken), is_decoded.eq(is_taken), instruction.eq(fetch.data)]
         for port, (first, other) in enumerate((("a", "b"), ("x", "c"))):
             m.d.comb += [
+                registers.read[port].valid.eq(is_decoded),
                 registers.read[port].thread.eq(decoded.thread),
                 registers.read[port].ray.eq(decoded.ray),
                 registers.read[port].number.eq(Mux(second, instruction[other], instruction[first])),

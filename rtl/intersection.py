@@ -11,6 +11,7 @@ from fpu import Delay
 from .arithmetic import ARITHMETICS
 from .block_memory import BlockMemory
 from .layout import PACKET_RAYS, scale_layout, thread_width, token_layout, vector_layout, with_token
+from .queue import Queue
 from .unit_triangle import MARGIN, unit_triangle
 
 __all__ = ["Intersection", "hit_layout", "limits_layout", "unit_triangle"]
@@ -168,6 +169,7 @@ class Intersection(wiring.Component):
         before = Signal(PACKET_RAYS)
         now = Signal(PACKET_RAYS)
         hits_so_far = Signal(PACKET_RAYS, reset_less=True)
+        tested, is_tested = Signal(self._token, reset_less=True), Signal()
         better = Signal()
         kept = Signal() if self._tolerance else better
         allowed, is_over = Signal(init=1), Signal()
@@ -175,10 +177,10 @@ class Intersection(wiring.Component):
             better.eq(valid[-1] & found.hit & allowed & (found.nearer | ~done.token.hit.bit_select(done.ray, 1))),
             before.eq(Mux(done.first, done.token.hit, hits_so_far)),
             now.eq(before | (kept << done.ray)),
-            self.tested.payload.eq(done.token),
-            self.tested.payload.hit.eq(now),
-            self.tested.valid.eq(valid[-1] & done.last),
+            self.tested.payload.eq(tested),
+            self.tested.valid.eq(is_tested),
         ]
+        m.d.sync += [tested.eq(done.token), tested.hit.eq(now), is_tested.eq(valid[-1] & done.last)]
         with m.If(valid[-1]):
             m.d.sync += hits_so_far.eq(now)
 
@@ -190,18 +192,28 @@ class Intersection(wiring.Component):
         m.d.comb += [new.valid.eq(kept), new.thread.eq(done.token.thread), new.ray.eq(done.ray),
                      new.t.eq(Mux(is_over, self._fmt.const(0.0), found.t))]
         new_best = Signal(best_layout) if self._tolerance else new.t
-        new_key = new_best.key if self._tolerance else new_best
-        m.submodules.records = records = memory.Memory(shape=self._record, depth=PACKET_RAYS * num_slots, init=[])
-        record_write = records.write_port()
+        # What is written is known late in a cycle, and goes in the next.
+        place = data.StructLayout({"ray": range(PACKET_RAYS), "thread": done.token.thread.shape()})
+        written = Signal(data.StructLayout({"place": place, "best": best_layout, "record": self._record}),
+                         reset_less=True)
+        is_written, record_is_written = Signal(), Signal()
+        record_write = Signal(data.StructLayout({"en": 1, "data": self._record}))
+        m.d.sync += [
+            is_written.eq(new.valid),
+            record_is_written.eq(record_write.en),
+            written.place.ray.eq(new.ray),
+            written.place.thread.eq(new.thread),
+            written.best.eq(new_best),
+            written.record.eq(record_write.data),
+        ]
         m.d.comb += [
             entered_write.addr.eq(self.entered.thread),
             entered_write.data.eq(self.entered.index),
             entered_write.en.eq(self.entered.valid),
             instance_read.addr.eq(done.token.thread),
-            distances.write.valid.eq(new.valid),
-            distances.write.address.eq(Cat(new.ray, new.thread)),
-            distances.write.data.eq(new_best),
-            record_write.addr.eq(Cat(new.ray, new.thread)),
+            distances.write.valid.eq(is_written),
+            distances.write.address.eq(written.place),
+            distances.write.data.eq(written.best),
             record_write.data.t.eq(new.t),
             record_write.data.u.eq(found.u),
             record_write.data.v.eq(found.v),
@@ -212,21 +224,27 @@ class Intersection(wiring.Component):
             record_write.en.eq(new.valid),
         ]
         for number in range(self._num_readers):
-            record_read = records.read_port()
-            record = Signal(self._record, name=f"record{number}", reset_less=True)
-            m.d.comb += [record_read.addr.eq(self.record_address[number]), self.record[number].eq(record)]
-            m.d.sync += record.eq(record_read.data)
+            m.submodules[f"records{number}"] = records = BlockMemory(self._record, depth=PACKET_RAYS * num_slots)
+            m.d.comb += [
+                records.write.valid.eq(record_is_written),
+                records.write.address.eq(written.place),
+                records.write.data.eq(written.record),
+                records.address.eq(self.record_address[number]),
+                self.record[number].eq(records.data),
+            ]
 
         # A second copy of the distances, a memory for each ray, for the stack, which wants all four at once.
+        asked_at = Signal.like(self.hit_address, name="asked_at", reset_less=True)
+        m.d.sync += asked_at.eq(self.hit_address)
         for ray in range(PACKET_RAYS):
             m.submodules[f"distances{ray}"] = bank = memory.Memory(shape=self._fmt, depth=num_slots, init=[])
-            bank_read, bank_write = bank.read_port(), bank.write_port()
+            bank_read, bank_write = bank.read_port(domain="comb"), bank.write_port()
             bank_distance = Signal(self._fmt, name=f"distance{ray}", reset_less=True)
             m.d.comb += [
-                bank_write.addr.eq(new.thread),
-                bank_write.data.eq(new_key),
-                bank_write.en.eq(new.valid & (new.ray == ray)),
-                bank_read.addr.eq(self.hit_address),
+                bank_write.addr.eq(written.place.thread),
+                bank_write.data.eq(written.best.key if self._tolerance else written.best),
+                bank_write.en.eq(is_written & (written.place.ray == ray)),
+                bank_read.addr.eq(asked_at),
                 self.hit_distances[ray].eq(bank_distance),
             ]
             m.d.sync += bank_distance.eq(bank_read.data)
@@ -235,18 +253,22 @@ class Intersection(wiring.Component):
                             taken=valid[-1] & allowed, is_over=is_over,
                             cycles=latency - graph.inputs["t_hit"].start)
         if self._limited:
+            # So that the shader does not wait within a cycle for whether there is a hit.
+            m.submodules.begins = queue = Queue(self.limit.payload.shape(), depth=2)
+            wiring.connect(m, wiring.flipped(self.limit), queue.i)
+            begins = queue.o
             with m.If(~kept):
-                m.d.comb += [new.valid.eq(self.limit.valid & self.limit.payload.has_far),
-                             new.thread.eq(self.limit.payload.thread), new.ray.eq(self.limit.payload.ray),
-                             new.t.eq(self.limit.payload.t_far),
+                m.d.comb += [new.valid.eq(begins.valid & begins.payload.has_far),
+                             new.thread.eq(begins.payload.thread), new.ray.eq(begins.payload.ray),
+                             new.t.eq(begins.payload.t_far),
                              record_write.data.triangle.eq(~0)]
                 if self._tolerance:
                     infinity = self._fmt.const(math.inf)
                     m.d.comb += [new_best.key.eq(new.t), new_best.front.eq(infinity), new_best.back.eq(infinity),
                                  record_write.en.eq(new.valid)]
-            m.d.comb += self.limit.ready.eq(~kept)
-            self._limit(m, test, to_ask.o, to_end.o, cycles=latency - ask_at, instances=instances,
-                        allowed=allowed, is_over=is_over)
+            m.d.comb += begins.ready.eq(~kept)
+            self._limit(m, test, begins, to_ask.o, to_end.o, asks=valid[ask_at], cycles=latency - ask_at,
+                        instances=instances, allowed=allowed, is_over=is_over)
         return m
 
     def _best(self, m, test, stored, asking):
@@ -290,26 +312,24 @@ class Intersection(wiring.Component):
         m.d.comb += [test.tolerance.eq(fmt.const(self._tolerance * 2.0**-fmt.frac_width)),
                      test.margin.eq(fmt.const(MARGIN * self._tolerance * 2.0**-fmt.frac_width))]
 
-    def _limit(self, m, test, asking, done, *, cycles, instances, allowed, is_over):
+    def _limit(self, m, test, begins, asking, done, *, asks, cycles, instances, allowed, is_over):
         """Looks up the limits of the ray ``asking``, ``cycles`` before it is ``done``."""
-        m.submodules.limits = limits = memory.Memory(
-            shape=self._limits, depth=PACKET_RAYS << thread_width(self._num_threads), init=[])
-        read, write = limits.read_port(), limits.write_port()
+        m.submodules.limits = limits = BlockMemory(self._limits, depth=PACKET_RAYS << thread_width(self._num_threads))
         instance_read = instances.read_port(domain="comb")
-        limit = Signal(self._limits, reset_less=True)
+        limit = limits.data
         m.submodules.asked = asked = Delay(
             data.StructLayout({"triangle": self._index_width, "instance": self._index_width}), cycles=2)
-        begin = self.limit.payload
+        begin = begins.payload
         m.d.comb += [
-            read.addr.eq(Cat(asking.ray, asking.token.thread)),
-            write.addr.eq(Cat(begin.ray, begin.thread)),
-            write.data.eq(begin.limits),
-            write.en.eq(self.limit.valid),
+            limits.reading.eq(asks),
+            limits.address.eq(Cat(asking.ray, asking.token.thread)),
+            limits.write.address.eq(Cat(begin.ray, begin.thread)),
+            limits.write.data.eq(begin.limits),
+            limits.write.valid.eq(begins.valid),
             instance_read.addr.eq(asking.token.thread),
             asked.i.triangle.eq(asking.index),
             asked.i.instance.eq(Mux(asking.token.level, instance_read.data, ~0)),
         ]
-        m.d.sync += limit.eq(read.data)
         if self._near:
             m.d.comb += test.t_near.eq(limit.t_near)
         m.submodules.verdict = verdict = Delay(data.StructLayout({"excluded": 1, "any_hit": 1}), cycles=cycles - 2,

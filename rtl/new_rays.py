@@ -12,7 +12,7 @@ from .queue import Queue
 
 __all__ = ["NewRays"]
 
-_CONVERT_LATENCY = 3
+_CONVERT_LATENCY = 5
 _QUEUE_DEPTH = 16
 
 
@@ -52,7 +52,10 @@ class NewRays(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.queue = queue = Queue(self._result, depth=_QUEUE_DEPTH, always_ready=True)
-        packet = self.primary.payload
+        # So that who makes packets does not wait within a cycle for who waits for rays.
+        m.submodules.packets = packets = Queue(self.primary.payload.shape(), depth=2)
+        wiring.connect(m, wiring.flipped(self.primary), packets.i)
+        packet = packets.o.payload
         done = Signal(PACKET_RAYS)
         remaining = Signal(PACKET_RAYS)
         ray, others = lowest_ray(m, remaining)
@@ -62,18 +65,18 @@ class NewRays(wiring.Component):
             remaining.eq(packet.token.mask & ~done),
             is_first.eq(~done.any()),
             has_room.eq(pending < _QUEUE_DEPTH),
-            self.begin.valid.eq(self.primary.valid & is_first & has_room),
+            self.begin.valid.eq(packets.o.valid & is_first & has_room),
             self.begin.payload.thread.eq(packet.token.thread),
             self.begin.payload.mask.eq(packet.token.mask),
-            issue.eq(self.primary.valid & has_room & (~is_first | self.begin.ready)),
-            self.primary.ready.eq(issue & ~others.any()),
+            issue.eq(packets.o.valid & has_room & (~is_first | self.begin.ready)),
+            packets.o.ready.eq(issue & ~others.any()),
         ]
         m.d.sync += pending.eq(pending + issue - (self.ray.valid & self.ray.ready))
         with m.If(issue):
             m.d.sync += done.eq(Mux(others.any(), done | (1 << ray), 0))
 
-        m.submodules.beside = beside = Delay(self._place, cycles=_CONVERT_LATENCY)
-        valid = Signal(_CONVERT_LATENCY + 1)
+        m.submodules.beside = beside = Delay(self._place, cycles=_CONVERT_LATENCY + 1)
+        valid = Signal(_CONVERT_LATENCY + 2)
         made = queue.i.payload
         m.d.comb += [
             valid[0].eq(issue),
@@ -90,6 +93,8 @@ class NewRays(wiring.Component):
         for lane, value in enumerate((packet.x + 2 * ray[0], packet.y - 2 * ray[1])):
             convert = IntToFloat(self._fmt, int_width=self._half_width, signed=True, latency=_CONVERT_LATENCY)
             m.submodules[f"screen{lane}"] = convert
-            m.d.comb += [convert.i.eq(value), made.value[lane].eq(convert.r)]
+            halves = Signal(signed(self._half_width), name=f"halves{lane}", reset_less=True)
+            m.d.sync += halves.eq(value)
+            m.d.comb += [convert.i.eq(halves), made.value[lane].eq(convert.r)]
         wiring.connect(m, queue.o, wiring.flipped(self.ray))
         return m

@@ -8,8 +8,8 @@ from .block_memory import BlockMemory
 
 __all__ = ["Merge", "Queue", "merged"]
 
-#: Elements in a distributed memory of ECP5.
-_DISTRIBUTED_DEPTH = 16
+#: Elements for which two distributed memories of ECP5 in a row are less than the block RAM is worth.
+_DISTRIBUTED_DEPTH = 32
 
 
 class Queue(wiring.Component):
@@ -28,7 +28,8 @@ class Queue(wiring.Component):
         The writer does not look at ``ready``, having other grounds to know that there is room: a token queue
         as deep as there are threads, say. That it is right is asserted in simulation.
     block : bool or None
-        Whether block RAM keeps them; by default if they are more than the 16 of a distributed memory.
+        Whether block RAM keeps them; by default if they are more than the 32 of two distributed memories and one
+        in the register.
 
     Members
     -------

@@ -1,9 +1,10 @@
 """The rays of all threads, kept twice: by axis for traversal, by vector for transformation."""
 
 from amaranth.hdl import Assert, Cat, Module, Signal
-from amaranth.lib import data, memory, wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
+from .block_memory import BlockMemory
 from .layout import PACKET_RAYS, Axis, thread_width, vector_layout
 
 __all__ = ["RayStore", "ray_store_ports"]
@@ -17,9 +18,9 @@ def ray_store_ports(*, fmt, num_threads):
     vector = {"thread": thread_width(num_threads), "level": 1, "is_origin": 1, "ray": range(PACKET_RAYS)}
     return {
         "write": data.StructLayout({"valid": 1, "own": 1, **vector, "vector": vector_layout(fmt)}),
-        "step_address": data.StructLayout({"thread": thread_width(num_threads), "level": 1, "axis": Axis}),
+        "step_address": data.StructLayout({"valid": 1, "thread": thread_width(num_threads), "level": 1, "axis": Axis}),
         "step_rays": data.ArrayLayout(data.StructLayout({"origin": fmt, "direction": fmt}), PACKET_RAYS),
-        "vector_address": data.StructLayout(vector),
+        "vector_address": data.StructLayout({"valid": 1, **vector}),
         "vector": vector_layout(fmt),
     }
 
@@ -45,9 +46,9 @@ class RayStore(wiring.Component):
     -------
     write : ``{"valid", "own", "thread", "level", "is_origin", "ray", "vector"}``, one vector of one packet, an origin
         of all its rays or of one ``own``; steps can read it ``write_latency`` cycles later
-    step_address : ``{"thread", "level", "axis"}``; two cycles later
+    step_address : ``{"valid", "thread", "level", "axis"}``; two cycles later
     step_rays : array of ``{"origin", "direction"}``: the coordinate of each ray
-    vector_address : ``{"thread", "level", "is_origin", "ray"}``; two cycles later
+    vector_address : ``{"valid", "thread", "level", "is_origin", "ray"}``; two cycles later
     vector : the coordinates of the one vector
     """
 
@@ -69,22 +70,20 @@ class RayStore(wiring.Component):
     def _bank(self, m, name, *, select, field):
         """One coordinate memory; takes a vector when ``select`` is set."""
         thread_bits = thread_width(self._num_threads)
-        m.submodules[name] = bank = memory.Memory(shape=self._fmt, depth=1 << thread_bits + 3, init=[])
-        write, read = bank.write_port(), bank.read_port()
+        m.submodules[name] = bank = BlockMemory(self._fmt, depth=1 << thread_bits + 3)
         axis = Signal(Axis, name=f"{name}_axis", init=Axis.LEAF)
         held = Signal(data.StructLayout({"level": 1, "thread": range(1 << thread_bits)}), name=f"{name}_held",
                       reset_less=True)
         vector = Signal(vector_layout(self._fmt), name=f"{name}_vector", reset_less=True)
-        coordinate = Signal(self._fmt, name=f"{name}_q", reset_less=True)
         m.d.comb += [
-            write.addr.eq(Cat(axis, held.level, held.thread)),
-            write.data.eq(vector.x),
-            write.en.eq(axis != Axis.LEAF),
-            read.addr.eq(Cat(self.step_address.axis, self.step_address.level, self.step_address.thread)),
-            field.eq(coordinate),
+            bank.write.valid.eq(axis != Axis.LEAF),
+            bank.write.address.eq(Cat(axis, held.level, held.thread)),
+            bank.write.data.eq(vector.x),
+            bank.reading.eq(self.step_address.valid),
+            bank.address.eq(Cat(self.step_address.axis, self.step_address.level, self.step_address.thread)),
+            field.eq(bank.data),
         ]
         m.d.sync += [
-            coordinate.eq(read.data),
             vector.x.eq(vector.y),
             vector.y.eq(vector.z),
         ]
@@ -119,15 +118,13 @@ class RayStore(wiring.Component):
             return Cat(of.ray, of.is_origin, of.level, of.thread)
 
         depth = 1 << len(address(self.vector_address))
-        m.submodules.vectors = vectors = memory.Memory(shape=vector_layout(self._fmt), depth=depth, init=[])
-        write, read = vectors.write_port(), vectors.read_port()
-        vector = Signal(vector_layout(self._fmt), reset_less=True)
+        m.submodules.vectors = vectors = BlockMemory(vector_layout(self._fmt), depth=depth)
         m.d.comb += [
-            write.addr.eq(address(self.write)),
-            write.data.eq(self.write.vector),
-            write.en.eq(self.write.valid),
-            read.addr.eq(address(self.vector_address)),
-            self.vector.eq(vector),
+            vectors.write.valid.eq(self.write.valid),
+            vectors.write.address.eq(address(self.write)),
+            vectors.write.data.eq(self.write.vector),
+            vectors.reading.eq(self.vector_address.valid),
+            vectors.address.eq(address(self.vector_address)),
+            self.vector.eq(vectors.data),
         ]
-        m.d.sync += vector.eq(read.data)
         return m

@@ -1,10 +1,11 @@
 """The registers of all rays, and the constants."""
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal
-from amaranth.lib import data, memory, wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import exact_log2
 
+from .block_memory import BlockMemory
 from .layout import PACKET_RAYS, camera_layout, thread_slots, thread_width
 from .microcode import NUM_REGISTERS, lane_width
 
@@ -35,7 +36,7 @@ class RegisterFile(wiring.Component):
     Members
     -------
     camera : the constants after the zero: three rows, then the origin
-    read : array of two addresses ``{"thread", "ray", "number"}``
+    read : array of two addresses ``{"valid", "thread", "ray", "number"}``
     value : array of two registers
     write : ``{"valid", "thread", "ray", "number", "mask", "value"}``
     """
@@ -49,7 +50,7 @@ class RegisterFile(wiring.Component):
         ray = {"thread": thread_width(num_threads), "ray": range(PACKET_RAYS)}
         self._bank_bits = bank_bits
         self._depth = NUM_REGISTERS * PACKET_RAYS * thread_slots(num_threads, bank_bits)
-        address = data.StructLayout({**ray, "number": range(2 * NUM_REGISTERS)})
+        address = data.StructLayout({"valid": 1, **ray, "number": range(2 * NUM_REGISTERS)})
         super().__init__({
             "camera": In(camera_layout(fmt)),
             "read": In(address).array(2),
@@ -75,20 +76,19 @@ class RegisterFile(wiring.Component):
         constants = self._constants()
         for port, (address, value) in enumerate(zip(self.read, self.value, strict=True)):
             number_bits = exact_log2(NUM_REGISTERS)
-            constant = [Signal(3 * width, name=f"constant{port}_{stage}", reset_less=True) for stage in range(2)]
+            constant = Signal(3 * width, name=f"constant{port}", reset_less=True)
+            number = Signal(number_bits, name=f"number{port}", reset_less=True)
             is_constant = Signal(2, name=f"is_constant{port}", reset_less=True)
-            m.d.sync += [constant[0].eq(constants[address.number[:number_bits]]), constant[1].eq(constant[0]),
+            m.d.sync += [number.eq(address.number[:number_bits]), constant.eq(constants[number]),
                          is_constant.eq(Cat(address.number[number_bits], is_constant[0]))]
             for lane in range(3):
-                m.submodules[f"lane{port}_{lane}"] = bank = memory.Memory(shape=width, depth=self._depth, init=[])
-                read, write = bank.read_port(), bank.write_port()
-                stored = Signal(width, name=f"stored{port}_{lane}", reset_less=True)
+                m.submodules[f"lane{port}_{lane}"] = bank = BlockMemory(width, depth=self._depth)
                 m.d.comb += [
-                    read.addr.eq(Cat(address.number[:number_bits], address.ray, address.thread[self._bank_bits:])),
-                    write.addr.eq(Cat(self.write.number, self.write.ray, self.write.thread[self._bank_bits:])),
-                    write.data.eq(self.write.value[lane]),
-                    write.en.eq(self.write.valid & self.write.mask[lane]),
-                    value[lane].eq(Mux(is_constant[1], constant[1].word_select(lane, width), stored)),
+                    bank.write.valid.eq(self.write.valid & self.write.mask[lane]),
+                    bank.write.address.eq(Cat(self.write.number, self.write.ray, self.write.thread[self._bank_bits:])),
+                    bank.write.data.eq(self.write.value[lane]),
+                    bank.reading.eq(address.valid),
+                    bank.address.eq(Cat(address.number[:number_bits], address.ray, address.thread[self._bank_bits:])),
+                    value[lane].eq(Mux(is_constant[1], constant.word_select(lane, width), bank.data)),
                 ]
-                m.d.sync += stored.eq(read.data)
         return m

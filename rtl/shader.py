@@ -148,11 +148,16 @@ class Shader(wiring.Component):
         return Cat(op == candidate for candidate in used).any() if used else Const(0)
 
     def _request_queue(self, m, name, shape, *, when, rooms):
-        """A queue for instructions of one kind; none is taken up unless it has room for all that are."""
+        """A queue for instructions of one kind; none is taken up unless it has room for all that are.
+
+        Whether it has is looked up a cycle before, in which one more may have been taken up.
+        """
         queue = Queue(shape, depth=_QUEUE_DEPTH, always_ready=True)
         m.submodules[f"{name}_queue"] = queue
         m.d.comb += queue.i.valid.eq(when)
-        rooms.append(queue.level + self._fetch.under_way < _QUEUE_DEPTH - 1)
+        has_room = Signal(name=f"{name}_has_room")
+        m.d.sync += has_room.eq(queue.level + self._fetch.under_way < _QUEUE_DEPTH - 2)
+        rooms.append(has_room)
         return queue
 
     def _result_queue(self, m, name, valid, result, rooms, *, latency):
@@ -164,7 +169,9 @@ class Shader(wiring.Component):
         pending = Signal(range(depth + 1), name=f"{name}_pending")
         m.d.comb += [queue.i.payload.eq(result), queue.i.valid.eq(valid)]
         m.d.sync += pending.eq(pending + begun - (queue.o.valid & queue.o.ready))
-        rooms.append(pending + self._fetch.under_way < depth - 1)
+        has_room = Signal(name=f"{name}_has_room")
+        m.d.sync += has_room.eq(pending + self._fetch.under_way < depth - 2)
+        rooms.append(has_room)
         return queue.o, begun
 
     def _control_results(self, m, control, rooms):

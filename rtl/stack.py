@@ -80,15 +80,17 @@ class TraversalStack(wiring.Component):
         def address(token, position):
             return Cat(position[:entry_bits], token.level, token.thread)
 
-        push = self.push
+        # The entry is not wanted soon, and has a long way to its many memories.
+        push, pushes = Signal.like(self.push, name="pushed", reset_less=True), Signal()
+        m.d.sync += [push.eq(self.push), pushes.eq(self.push.valid)]
         m.d.comb += [
-            entries.write.valid.eq(push.valid),
+            entries.write.valid.eq(pushes),
             entries.write.address.eq(address(push.token, push.token.sp)),
             entries.write.data.node.eq(push.node),
             entries.write.data.mask.eq(push.token.mask),
             entries.write.data.intervals.eq(push.intervals),
         ]
-        m.d.sync += Assert(~push.valid | (push.token.sp < self._stack_depth), "a traversal stack overflows")
+        m.d.sync += Assert(~pushes | (push.token.sp < self._stack_depth), "a traversal stack overflows")
 
         # An entry that proved worthless sends its token round again.
         m.submodules.merge = merge = Merge(self._token, num_inputs=2)

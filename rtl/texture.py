@@ -1,7 +1,7 @@
 """Texture lookups: four texels about a place, decoded and weighted."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal
-from amaranth.lib import data, memory, stream, wiring
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import exact_log2
 
@@ -9,6 +9,7 @@ from fpu import Delay
 from fpu.product import Product
 from fpu.rom import Rom
 
+from .block_memory import BlockMemory
 from .cache import WORD_WIDTH, Cache
 from .color_unit import byte_fraction
 from .queue import Queue
@@ -220,16 +221,15 @@ class Texture(wiring.Component):
                      self.miss.eq(cache.miss)]
 
         # Counts of texels that have come go round, so they begin anew by themselves.
-        m.submodules.texels = texels = memory.Memory(shape=WORD_WIDTH, depth=4 * depth, init=[])
-        write, read = texels.write_port(), texels.read_port()
+        m.submodules.texels = texels = BlockMemory(WORD_WIDTH, depth=4 * depth)
         counts = Signal(data.ArrayLayout(2, depth))
         complete = Signal(depth)
         found = cache.response.payload.payload
         m.d.comb += [
             cache.response.ready.eq(1),
-            write.addr.eq(Cat(found.corner, found.slot)),
-            write.data.eq(cache.response.payload.item),
-            write.en.eq(cache.response.valid),
+            texels.write.valid.eq(cache.response.valid),
+            texels.write.address.eq(Cat(found.corner, found.slot)),
+            texels.write.data.eq(cache.response.payload.item),
         ]
         with m.If(cache.response.valid & found.filtered):
             m.d.sync += counts[found.slot].eq(counts[found.slot] + 1)
@@ -237,30 +237,29 @@ class Texture(wiring.Component):
             m.d.sync += complete.bit_select(found.slot, 1).eq(1)
 
         # One cycle for each texel, of the oldest request.
-        reading = 2
+        reading = texels.latency
         m.submodules.blend = blend = _Blend()
         oldest, texel = Signal(slot_width), Signal(2)
         weighs, is_last_texel = Signal(), Signal()
         is_summed = Signal(reading + blend.latency)
         m.submodules.beside = beside = Delay(
             data.StructLayout({"first": 1, "corner": 2, "f": WEIGHT_BITS, "g": WEIGHT_BITS}), cycles=reading)
-        word = Signal(WORD_WIDTH, reset_less=True)
         m.d.comb += [
             weighs.eq(complete.bit_select(oldest, 1)),
             is_last_texel.eq(~weights.o.payload.filtered | texel.all()),
             weights.o.ready.eq(weighs & is_last_texel),
-            read.addr.eq(Cat(texel, oldest)),
+            texels.reading.eq(weighs),
+            texels.address.eq(Cat(texel, oldest)),
             beside.i.first.eq(texel == 0),
             beside.i.corner.eq(texel),
             beside.i.f.eq(weights.o.payload.f),
             beside.i.g.eq(weights.o.payload.g),
-            blend.texel.eq(word),
+            blend.texel.eq(texels.data),
             [getattr(blend, name).eq(beside.o[name]) for name in ("first", "corner", "f", "g")],
             [color.eq(total[2 * WEIGHT_BITS:]) for color, total in zip(colors.i.payload, blend.sums, strict=True)],
             colors.i.valid.eq(is_summed[-1]),
         ]
         m.d.sync += [
-            word.eq(read.data),
             is_summed.eq(Cat(weighs & is_last_texel, is_summed)),
         ]
         with m.If(weighs):

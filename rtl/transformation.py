@@ -15,6 +15,9 @@ from .transformation_jobs import Kind, TransformationJobs
 
 __all__ = ["Transformation", "affine_map"]
 
+#: Of a primary ray's place on the screen
+_CONVERT_LATENCY = 4
+
 
 class Transformation(wiring.Component):
     """Maps the rays of packets: from the screen into the scene, into an instance, into a triangle's space.
@@ -110,40 +113,47 @@ class Transformation(wiring.Component):
         if self._tag is None:
             ray = jobs.vector.about.ray
             m.d.sync += [given.x.eq(jobs.vector.x + 2 * ray[0]), given.y.eq(jobs.vector.y - 2 * ray[1])]
-        m.d.comb += self.vector_address.eq(address)
+        # Stored vectors are read while x and y of primary rays are converted.
+        waits = _CONVERT_LATENCY - RayStore.read_latency if self._tag is None else 0
+        m.submodules.to_store = to_store = Delay(address.shape(), cycles=waits)
+        m.d.comb += [to_store.i.eq(address), self.vector_address.eq(to_store.o)]
         self._map(m, given, active)
         return m
 
     def _map(self, m, given, active):
         """From a vector's address to its results, in all the places where they go."""
-        read_latency = RayStore.read_latency
         has_shader = self._tag is not None
+        to_choose = RayStore.read_latency if has_shader else _CONVERT_LATENCY
+        # Which of the vectors it is, is a stage of its own.
+        read_latency = to_choose + 1
         about_layout = given.about.shape()
-        m.submodules.to_map = to_map = Delay(
-            data.StructLayout({"about": about_layout, "matrix": matrix_layout(self._fmt)}), cycles=read_latency)
-        vector = Signal(vector_layout(self._fmt))
-        m.d.comb += [to_map.i.about.eq(given.about), to_map.i.matrix.eq(given.matrix), vector.eq(self.stored_vector)]
+        to_map_layout = data.StructLayout({"about": about_layout, "matrix": matrix_layout(self._fmt)})
+        m.submodules.to_map = to_map = Delay(to_map_layout, cycles=to_choose)
+        chosen = Signal(to_map_layout, reset_less=True)
+        vector = Signal(vector_layout(self._fmt), reset_less=True)
+        m.d.comb += [to_map.i.about.eq(given.about), to_map.i.matrix.eq(given.matrix)]
+        m.d.sync += [chosen.eq(to_map.o), vector.eq(self.stored_vector)]
         if has_shader:
             with m.If(to_map.o.about.kind == Kind.STEP):
-                m.d.comb += vector.eq(to_map.o.matrix.center)
+                m.d.sync += vector.eq(to_map.o.matrix.center)
         else:
-            screen = self._screen(m, given, latency=read_latency)
+            screen = self._screen(m, given, latency=_CONVERT_LATENCY)
             with m.If(to_map.o.about.kind == Kind.CAMERA):
-                m.d.comb += [vector.x.eq(screen[0]), vector.y.eq(screen[1]), vector.z.eq(self._fmt.const(1.0))]
+                m.d.sync += [vector.x.eq(screen[0]), vector.y.eq(screen[1]), vector.z.eq(self._fmt.const(1.0))]
 
         graph = affine_map(self._fmt, latencies=self._latencies, arithmetic=self._arithmetic, scaled=self._scaled)
         m.submodules.map = mapping = graph.component()
-        m.d.comb += mapping.is_point.eq(to_map.o.about.is_origin)
+        m.d.comb += mapping.is_point.eq(chosen.about.is_origin)
         for axis in "xyz":
             m.d.comb += [
                 getattr(mapping, f"vector_{axis}").eq(getattr(vector, axis)),
-                getattr(mapping, f"center_{axis}").eq(getattr(to_map.o.matrix.center, axis)),
-                *(getattr(mapping, f"row{row}_{axis}").eq(getattr(to_map.o.matrix.rows[row], axis))
+                getattr(mapping, f"center_{axis}").eq(getattr(chosen.matrix.center, axis)),
+                *(getattr(mapping, f"row{row}_{axis}").eq(getattr(chosen.matrix.rows[row], axis))
                   for row in range(3)),
             ]
         m.submodules.about = about = Delay(about_layout, cycles=mapping.latency, registered=True)
         valid = Signal(read_latency + mapping.latency + 1)
-        m.d.comb += [about.i.eq(to_map.o.about), valid[0].eq(active)]
+        m.d.comb += [about.i.eq(chosen.about), valid[0].eq(active)]
         m.d.sync += valid[1:].eq(valid[:-1])
 
         out = about.o
@@ -151,41 +161,55 @@ class Transformation(wiring.Component):
         mapped = Signal(vector_layout(self._fmt))
         for axis in "xyz":
             m.d.comb += getattr(mapped, axis).eq(getattr(mapping, f"result_{axis}"))
-        is_origin = Signal()
+        is_origin, own = Signal(), Signal()
+        m.d.comb += is_origin.eq(out.is_origin)
+        # What of it is for whom is known a cycle later.
+        result = Signal.like(mapped, reset_less=True)
+        write_valid, vector_valid, stepped_valid = Signal(), Signal(), Signal()
+        write, vector_about = (Signal.like(member, name=name, reset_less=True)
+                               for name, member in (("writing", self.write), ("about_vector", self.vector.payload)))
+        m.d.sync += [
+            result.eq(mapped),
+            write_valid.eq(valid[-1] & (out.kind != Kind.TRIANGLE)),
+            write.level.eq(out.kind == Kind.INSTANCE),
+            write.is_origin.eq(is_origin),
+            write.thread.eq(token.thread),
+            vector_valid.eq(valid[-1] & (out.kind == Kind.TRIANGLE)),
+            vector_about.token.eq(token),
+            vector_about.index.eq(out.job.index),
+            vector_about.solid.eq(out.job.solid),
+            vector_about.is_origin.eq(is_origin),
+            vector_about.ray.eq(out.ray),
+            vector_about.first.eq(out.first),
+            vector_about.last.eq(out.last),
+        ]
         m.d.comb += [
-            is_origin.eq(out.is_origin),
-            self.write.valid.eq(valid[-1] & (out.kind != Kind.TRIANGLE)),
-            self.write.level.eq(out.kind == Kind.INSTANCE),
-            self.write.is_origin.eq(is_origin),
-            self.write.thread.eq(token.thread),
-            self.write.vector.eq(mapped),
-            self.vector.valid.eq(valid[-1] & (out.kind == Kind.TRIANGLE)),
-            self.vector.payload.token.eq(token),
-            self.vector.payload.index.eq(out.job.index),
-            self.vector.payload.solid.eq(out.job.solid),
-            self.vector.payload.is_origin.eq(is_origin),
-            self.vector.payload.ray.eq(out.ray),
-            self.vector.payload.first.eq(out.first),
-            self.vector.payload.last.eq(out.last),
-            self.vector.payload.vector.eq(mapped),
+            self.write.eq(write),
+            self.write.valid.eq(write_valid),
+            self.write.vector.eq(result),
+            self.vector.payload.eq(vector_about),
+            self.vector.payload.vector.eq(result),
+            self.vector.valid.eq(vector_valid),
         ]
         if self._scaled:
-            m.d.comb += [self.vector.payload.scale[number].eq(getattr(mapping, f"result_scale_{axis}").exp)
+            m.d.sync += [vector_about.scale[number].eq(getattr(mapping, f"result_scale_{axis}").exp)
                          for number, axis in enumerate("xyz")]
         if has_shader:
             is_step = out.kind == Kind.STEP
+            tag = Signal.like(out.tag, name="stepped_tag", reset_less=True)
             with m.If(is_step):
-                m.d.comb += [self.write.valid.eq(valid[-1] & (out.store != Store.NOWHERE)),
-                             is_origin.eq(out.store == Store.ORIGIN)]
-            m.d.comb += [
-                self.write.own.eq(is_step | ~out.shared),
-                self.write.ray.eq(Mux(is_origin & ~self.write.own, 0, out.ray)),
-                self.stepped.valid.eq(valid[-1] & is_step),
-                self.stepped.tag.eq(out.tag),
-                self.stepped.vector.eq(mapped),
+                m.d.sync += write_valid.eq(valid[-1] & (out.store != Store.NOWHERE))
+                m.d.comb += is_origin.eq(out.store == Store.ORIGIN)
+            m.d.comb += own.eq(is_step | ~out.shared)
+            m.d.sync += [
+                write.own.eq(own),
+                write.ray.eq(Mux(is_origin & ~own, 0, out.ray)),
+                stepped_valid.eq(valid[-1] & is_step),
+                tag.eq(out.tag),
             ]
+            m.d.comb += [self.stepped.valid.eq(stepped_valid), self.stepped.tag.eq(tag), self.stepped.vector.eq(result)]
         else:
-            m.d.comb += self.write.ray.eq(Mux(is_origin, 0, out.ray))
+            m.d.sync += write.ray.eq(Mux(is_origin, 0, out.ray))
             with m.If((out.kind == Kind.CAMERA) & out.is_origin):
                 m.d.comb += mapped.eq(self.camera.origin)
         self._start(m, out, valid[-1])
@@ -201,8 +225,8 @@ class Transformation(wiring.Component):
         return screen
 
     def _start(self, m, out, valid):
-        """The start is announced when the store has the last vector."""
-        stages = RayStore.write_latency
+        """The start is announced when the store has the last vector, which goes there a cycle later."""
+        stages = RayStore.write_latency + 1
         start = [Signal(self.start.payload.shape(), name=f"start{k}", reset_less=True) for k in range(stages + 1)]
         starting = Signal(stages + 1)
         starts = out.kind == Kind.INSTANCE

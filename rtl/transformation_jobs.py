@@ -72,39 +72,54 @@ class TransformationJobs(wiring.Component):
     def elaborate(self, platform):
         m = Module()
 
-        # The job at work: its origin first, then one direction after the other.
-        current = Signal(self._current, reset_less=True)
-        active = Signal()
+        # The job at work: its origin first, then one direction after the other; and the one to follow, so that who is
+        # asked for it does not wait within a cycle for how far the one at work is.
+        current, following = (Signal(self._current, name=name, reset_less=True) for name in ("current", "following"))
+        active, has_following = Signal(), Signal()
         origin_next, first = Signal(reset_less=True), Signal(reset_less=True)
         has_shader = self._has_shader
         shared = current.shared if has_shader else Const(1, 1)
-        remaining = Signal(PACKET_RAYS, reset_less=True)
+        remaining, mask = Signal(PACKET_RAYS, reset_less=True), Signal(PACKET_RAYS, reset_less=True)
         ray, others = lowest_ray(m, remaining)
-        last, boundary = Signal(), Signal()
+        stores, following_stores, has_origin = (Signal(name=name, reset_less=True)
+                                                for name in ("stores", "following_stores", "has_origin"))
+        last = Signal(reset_less=True)
+        boundary, moves, room, lately = Signal(), Signal(), Signal(), Signal()
+        # Between the vectors of two packets for the ray store goes a pause: it takes three cycles for one of the same
+        # origin or ray. A step may be of the same ray as the one before.
+        if has_shader:
+            stored = Signal()
+            m.d.sync += stored.eq(active & stores)
+            m.d.comb += lately.eq(active & stores | stored)
+        else:
+            m.d.comb += lately.eq(active & stores)
         m.d.comb += [
-            # A mask is never empty, so an origin is never the last vector.
-            last.eq(~origin_next & ~others.any()),
             boundary.eq(~active | last),
+            moves.eq(boundary & has_following & ~(lately & following_stores)),
+            room.eq(~has_following | moves),
         ]
         with m.If(boundary):
             m.d.sync += active.eq(0)
+        # An origin is never the last vector, as a mask is never empty.
         with m.If(origin_next):
-            m.d.sync += origin_next.eq(0)
+            m.d.sync += [origin_next.eq(0), last.eq(~others.any())]
         with m.Else():
-            m.d.sync += [remaining.eq(others), origin_next.eq(~shared), first.eq(0)]
+            m.d.sync += [remaining.eq(others), origin_next.eq(~shared), first.eq(0),
+                         last.eq(shared & others.any() & ~(others & (others - 1)).any())]
+        with m.If(moves):
+            m.d.sync += [current.eq(following), stores.eq(following_stores), active.eq(1), remaining.eq(mask),
+                         origin_next.eq(has_origin), last.eq(~has_origin), first.eq(1)]
 
-        def take(kind, mask, has_origin=1):
-            m.d.sync += [active.eq(1), origin_next.eq(has_origin), first.eq(1), current.kind.eq(kind),
-                         remaining.eq(mask)]
+        def take(kind, rays, *, to_store, origin=1):
+            m.d.sync += [following.kind.eq(kind), mask.eq(rays), has_origin.eq(origin), following_stores.eq(to_store)]
 
-        storing = Signal()
-        if not has_shader:
-            m.d.comb += storing.eq(active & (current.kind != Kind.TRIANGLE))
-            self._take_primary(m, current, boundary, storing, take)
+        # Where there is room something is put, whether it is there or not: many a bit waits for who it is.
+        if has_shader:
+            comes = self._take_step(m, following, room, Mux(has_following, following_stores, lately), take)
         else:
-            m.d.comb += storing.eq(active & ((current.kind == Kind.INSTANCE)
-                                             | (current.kind == Kind.STEP) & (current.store != Store.NOWHERE)))
-            self._take_step(m, current, boundary, storing, take)
+            comes = self._take_primary(m, following, room, take)
+        with m.If(room):
+            m.d.sync += has_following.eq(comes)
 
         token, about = current.job.token, self.vector.about
         m.d.comb += [
@@ -115,6 +130,7 @@ class TransformationJobs(wiring.Component):
             about.last.eq(last),
             about.ray.eq(ray),
             *(self.vector[name].eq(current[name]) for name in ("matrix", *self._screen)),
+            self.vector_address.valid.eq(active & (current.kind != Kind.STEP) & (current.kind != Kind.CAMERA)),
             self.vector_address.thread.eq(token.thread),
             self.vector_address.level.eq(token.level),
             self.vector_address.is_origin.eq(origin_next),
@@ -126,63 +142,58 @@ class TransformationJobs(wiring.Component):
         ]
         return m
 
-    def _take_primary(self, m, current, boundary, storing, take):
-        """Takes a packet to make before one to transform."""
-        matrix = self.matrix.payload
-        allowed = Signal()
+    def _take_primary(self, m, following, room, take):
+        """Takes a packet to make before one to transform; returns whether there is any."""
         m.d.comb += [
-            # Between the vectors of two packets for the ray store goes a pause: it takes three cycles for one of
-            # the same origin or ray.
-            allowed.eq(boundary & ~(storing & (self.primary.valid | matrix.payload.instance))),
-            self.primary.ready.eq(allowed),
-            self.matrix.ready.eq(allowed & ~self.primary.valid),
+            self.primary.ready.eq(room),
+            self.matrix.ready.eq(room & ~self.primary.valid),
         ]
-        with m.If(allowed & self.primary.valid):
-            take(Kind.CAMERA, self.primary.payload.token.mask)
-            m.d.sync += [
-                current.job.token.eq(self.primary.payload.token),
-                current.matrix.rows.eq(self.camera.rows),
-                current.x.eq(self.primary.payload.x),
-                current.y.eq(self.primary.payload.y),
-            ]
-        with m.Elif(allowed & self.matrix.valid):
-            self._take_matrix(m, current, take)
+        with m.If(room):
+            self._take_matrix(m, following, take)
+            with m.If(self.primary.valid):
+                take(Kind.CAMERA, self.primary.payload.token.mask, to_store=1)
+                m.d.sync += [
+                    following.job.token.eq(self.primary.payload.token),
+                    following.matrix.rows.eq(self.camera.rows),
+                    following.x.eq(self.primary.payload.x),
+                    following.y.eq(self.primary.payload.y),
+                ]
+        return self.primary.valid | self.matrix.valid
 
-    def _take_step(self, m, current, boundary, storing, take):
-        """Takes a vector of the shader before a packet to transform."""
+    def _take_step(self, m, following, room, after_store, take):
+        """Takes a vector of the shader before a packet to transform, unless that vector would have to wait.
+
+        Returns whether there is any.
+        """
         matrix, step = self.matrix.payload, self.step.payload
         m.submodules.origins = origins = memory.Memory(shape=1, depth=1 << thread_width(self._num_threads), init=[])
         write, read = origins.write_port(), origins.read_port(domain="comb")
-        stored = Signal()
-        lately = Signal()
-        go_step = Signal()
-        m.d.sync += stored.eq(storing)
+        stores, is_step = Signal(), Signal()
         m.d.comb += [
-            # The ray store takes three cycles for a vector, and a step may be of the same ray as the one before.
-            lately.eq(storing | stored),
-            self.step.ready.eq(boundary & ~(lately & (step.store != Store.NOWHERE))),
-            go_step.eq(self.step.valid & self.step.ready),
-            self.matrix.ready.eq(boundary & ~go_step & ~(lately & matrix.payload.instance)),
+            stores.eq(step.store != Store.NOWHERE),
+            is_step.eq(self.step.valid & ~(stores & after_store & self.matrix.valid)),
+            self.step.ready.eq(room & is_step),
+            self.matrix.ready.eq(room & ~is_step),
             write.addr.eq(self.shared.thread),
             write.data.eq(self.shared.shared),
             write.en.eq(self.shared.valid),
             read.addr.eq(matrix.payload.token.thread),
         ]
-        with m.If(go_step):
-            take(Kind.STEP, 1 << step.ray, has_origin=0)
-            m.d.sync += [
-                current.job.token.thread.eq(step.thread),
-                current.tag.eq(step.tag),
-                current.store.eq(step.store),
-                current.matrix.rows.eq(step.rows),
-                # No point is mapped, so its place is free.
-                current.matrix.center.eq(step.vector),
-            ]
-        with m.Elif(self.matrix.valid & self.matrix.ready):
-            self._take_matrix(m, current, take)
-            m.d.sync += current.shared.eq(read.data)
+        with m.If(room):
+            self._take_matrix(m, following, take)
+            m.d.sync += [following.shared.eq(read.data), following.tag.eq(step.tag), following.store.eq(step.store)]
+            with m.If(is_step):
+                take(Kind.STEP, 1 << step.ray, to_store=stores, origin=0)
+                m.d.sync += [
+                    following.job.token.thread.eq(step.thread),
+                    following.matrix.rows.eq(step.rows),
+                    # No point is mapped, so its place is free.
+                    following.matrix.center.eq(step.vector),
+                ]
+        return self.step.valid | self.matrix.valid
 
-    def _take_matrix(self, m, current, take):
+    def _take_matrix(self, m, following, take):
         matrix = self.matrix.payload
-        take(Mux(matrix.payload.instance, Kind.INSTANCE, Kind.TRIANGLE), matrix.payload.token.mask)
-        m.d.sync += [current.job.eq(matrix.payload), current.matrix.eq(matrix.item)]
+        take(Mux(matrix.payload.instance, Kind.INSTANCE, Kind.TRIANGLE), matrix.payload.token.mask,
+             to_store=matrix.payload.instance)
+        m.d.sync += [following.job.eq(matrix.payload), following.matrix.eq(matrix.item)]

