@@ -107,6 +107,12 @@ class Circuit(wiring.Component):
             return [*unit.a, *unit.b, *([unit.c] if unit.has_addend else [])]
         return [unit.a, unit.b] if len(node.operands) == 2 else [unit.a]
 
+    @staticmethod
+    def _delayed(m, name, value, *, cycles):
+        m.submodules[name] = delay = Delay(value.shape(), cycles=cycles)
+        m.d.comb += delay.i.eq(value)
+        return delay.o
+
     def _build(self, m, node, operands, *, name):
         if node.op == "input":
             return getattr(self, node.payload)
@@ -114,9 +120,13 @@ class Circuit(wiring.Component):
         if node.op == "const":
             m.d.comb += signal.eq(self.datapath.fmt.const(node.payload))
         elif node.op in _LOGIC:
+            cycles = 0 if node.arrival is None else node.arrival - node.start
+            if cycles > 1:
+                operands = [self._delayed(m, f"{name}_operand_{number}", operand, cycles=cycles - 1)
+                            for number, operand in enumerate(operands)]
             value = _LOGIC[node.op](*operands)
-            if node.arrival is not None and node.arrival > node.start:
-                m.submodules[name] = delay = Delay(self._shape(node), cycles=node.arrival - node.start)
+            if cycles:
+                m.submodules[name] = delay = Delay(self._shape(node), cycles=1)
                 m.d.comb += Value.cast(delay.i).eq(value)
                 value = delay.o
             m.d.comb += Value.cast(signal).eq(value)

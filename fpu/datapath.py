@@ -42,7 +42,8 @@ class Datapath(Graph):
     latencies : dict from str to int
         Latency of ``"add"`` (also subtraction), ``"mul"``, ``"div"``, ``"cmp"``, ``"rec"``, ``"sqrt"``, ``"rsqrt"``,
         ``"dot"``, ``"select"`` and ``"power"`` (arithmetic on powers), in cycles. Missing ones are the operators' own
-        defaults, or what ``clock_mhz`` asks for; none for ``"select"``, 1 for ``"power"``.
+        defaults, or what ``clock_mhz`` asks for; none for ``"select"``, 1 for ``"power"``, of which ``raised`` has
+        twice as many.
     rounding : Rounding
         How all results are rounded, where there is a choice.
     operators : dict from str to type
@@ -76,7 +77,9 @@ class Datapath(Graph):
         self.guard_width = guard_width
         self.clock_mhz = clock_mhz
         self._operators = OPERATORS | operators
-        of_powers = dict.fromkeys(("power_max", "power_mul", "power_div", "raised"), latencies.get("power", 1))
+        of_powers = dict.fromkeys(("power_max", "power_mul", "power_div"), latencies.get("power", 1))
+        # An addition, which has registers in front of it too.
+        of_powers["raised"] = 2 * latencies.get("power", 1)
         super().__init__(fmt, latencies={"select": latencies.get("select", 0), **of_powers})
         self._given = latencies
 

@@ -48,14 +48,17 @@ def expected(fmt, op, a, b):
 
 
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
+@pytest.mark.parametrize("latency", [0, 1, 2])
 @pytest.mark.parametrize("op", ["power_max", "power_mul", "power_div", "raised", "is_within", "is_at_most_one_plus"])
-def test_every_pair(fmt, op):
+def test_every_pair(fmt, latency, op):
     powers = np.array([0.0, *(2.0 ** np.arange(1 - fmt.bias, fmt.exp_inf - fmt.bias)), np.inf])
     every = np.unique(fmt.decode(np.arange(1 << fmt.width)))
     first = every if op == "raised" or op.startswith("is_") else powers
     a, b = (pair.ravel() for pair in np.meshgrid(first, powers))
-    dp = Datapath(fmt, latencies={"power": 0})
+    dp = Datapath(fmt, latencies={"power": latency})
     dp.output("r", getattr(dp, op)(dp.input("a"), dp.input("b")))
+    # Relations take no operator, and no register.
+    assert dp.latency == (0 if op.startswith("is_") else 2 * latency if op == "raised" else latency)
     model = dp.model(a=a, b=b)["r"]
     wanted = np.array([expected(fmt, op, p, q) for p, q in zip(a, b, strict=True)])
     assert (model == wanted).all()
@@ -64,13 +67,24 @@ def test_every_pair(fmt, op):
     dut, hardware = dp.component(), []
     simulator = Simulator(dut)
 
-    async def testbench(ctx):
+    async def at_once(ctx):
         for p, q in zip(a, b, strict=True):
             ctx.set(dut.a, float(p))
             ctx.set(dut.b, float(q))
             hardware.append(ctx.get(dut.r))
 
-    simulator.add_testbench(testbench)
+    async def one_a_clock(ctx):
+        for number in range(a.size + dp.latency):
+            if number < a.size:
+                ctx.set(dut.a, float(a[number]))
+                ctx.set(dut.b, float(b[number]))
+            if number >= dp.latency:
+                hardware.append(ctx.get(dut.r))
+            await ctx.tick()
+
+    if dp.latency:
+        simulator.add_clock(1e-8)
+    simulator.add_testbench(one_a_clock if dp.latency else at_once)
     simulator.run()
     assert (np.array(hardware) == wanted).all()
 
