@@ -45,15 +45,15 @@ class Routed:
     areas: dict
 
 
-def board_design(board, *, config, clock_mhz):
-    """A board's design, and the MHz of each of its clock domains.
+def board_design(board, *, config, clock_mhz, scene=None):
+    """A board's design, and the MHz of each of its clock domains; see :class:`~.pins.BoardPins`.
 
     Raises
     ------
     ValueError
         See :class:`~.pins.BoardPins`.
     """
-    pins = BoardPins(board, config=config, clock_mhz=clock_mhz)
+    pins = BoardPins(board, config=config, clock_mhz=clock_mhz, scene=scene)
     plan = board.platform().prepare(pins, name="top", emit_src=False)
     files = {name: text if isinstance(text, str) else text.decode() for name, text in plan.files.items()}
     design = Design(name=board.name, script=f"read_rtlil top.il; {_SCRIPT}", device=board.device,

@@ -89,7 +89,9 @@ def _read_ports(memory):
 def _registers_behind(cells, readers, memory, side, outputs):
     """Names of the flip-flops behind a read port, one for each output that is used; none if they must stay."""
     ends = memory["connections"]
-    if ends[f"CE{side}"] != _ALWAYS or ends[f"RST{side}"] != _NEVER or memory["parameters"][f"CLK{side}MUX"] == "INV":
+    # A memory that is only read has parameters of one side.
+    is_inverted = memory["parameters"].get(f"CLK{side}MUX") == "INV"
+    if ends.get(f"CE{side}") != _ALWAYS or ends.get(f"RST{side}", _NEVER) != _NEVER or is_inverted:
         return {}
     registers = {}
     for output in outputs:

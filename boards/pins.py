@@ -1,13 +1,19 @@
 """A board's FPGA, from its clock's pin to its screen's."""
 
+from dataclasses import dataclass
+
 from amaranth.hdl import Cat, ClockDomain, Elaboratable, Module
 from amaranth.lib import io
 
+from rtl.standalone.standalone_top import StandaloneTop
 from rtl.top import Top
 
 from .pll import Clock, Pll
 
-__all__ = ["SDRAM_LEAD_NS", "BoardPins"]
+__all__ = ["SDRAM_LEAD_NS", "BoardPins", "BuiltInScene"]
+
+#: Of a picture in block RAM, the logarithm of how many pixels of the screen one of its is a side: 128×96 of 1024×768
+_SCALE_LOG2 = 3
 
 #: By how much the SDRAM's clock is ahead of the controller's. Both go out through the same kind of register and pin. So
 #: a command is at the pins a period less this before the clock that takes it, 3 ns at 125 MHz where 1.5 is needed, and
@@ -21,8 +27,24 @@ _OUTPUTS = {"clk_en": ("cke", False), "cs": ("cs_n", True), "ras": ("ras_n", Tru
 _NUM_COLORS = 3
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BuiltInScene:
+    """A scene in a bitstream, see :class:`~rtl.standalone.standalone_top.StandaloneTop`.
+
+    Parameters
+    ----------
+    memories, cameras, root, background
+        As there.
+    """
+
+    memories: dict
+    cameras: list
+    root: int
+    background: int
+
+
 class BoardPins(Elaboratable):
-    """A :class:`~rtl.top.Top` behind the pins of a board.
+    """A :class:`~rtl.top.Top` behind the pins of a board, or a chip with its scene, behind those of a screen.
 
     Parameters
     ----------
@@ -31,6 +53,8 @@ class BoardPins(Elaboratable):
         The chip.
     clock_mhz : float
         Of chip and SDRAM.
+    scene : BuiltInScene, optional
+        What is drawn, without host and SDRAM.
 
     Attributes
     ----------
@@ -43,18 +67,24 @@ class BoardPins(Elaboratable):
         If the clock cannot be made, is too fast for the SDRAM, or does not make the serial port's rate.
     """
 
-    def __init__(self, board, *, config, clock_mhz):
+    def __init__(self, board, *, config, clock_mhz, scene=None):
         self._board = board
+        self._scene = scene
         pixel_mhz = board.mode.pixel_mhz
-        self._chip_clocks = [Clock(domain="sync", mhz=clock_mhz),
-                             Clock(domain="sdram", mhz=clock_mhz, lag_ns=-SDRAM_LEAD_NS, reset=False)]
+        self._chip_clocks = [Clock(domain="sync", mhz=clock_mhz)]
+        if scene is None:
+            self._chip_clocks.append(Clock(domain="sdram", mhz=clock_mhz, lag_ns=-SDRAM_LEAD_NS, reset=False))
         self._screen_clocks = [Clock(domain="shift", mhz=5 * pixel_mhz), Clock(domain="pixel", mhz=pixel_mhz)]
         self._plls = [Pll(board.oscillator_mhz, clocks) for clocks in (self._chip_clocks, self._screen_clocks)]
         self.clocks = {clock.domain: mhz for pll, clocks in zip(self._plls, self._all_clocks, strict=True)
                        for clock, mhz in zip(clocks, pll.plan.mhz, strict=True)}
         exact = self.clocks["sync"]
-        self._top = Top(config, timing=board.timing(exact), mode=board.mode, scale=board.scale,
-                        divisor=board.divisor(exact))
+        if scene is None:
+            self._top = Top(config, timing=board.timing(exact), mode=board.mode, scale=board.scale,
+                            divisor=board.divisor(exact))
+        else:
+            self._top = StandaloneTop(config, memories=scene.memories, cameras=scene.cameras, root=scene.root,
+                                      background=scene.background, mode=board.mode, scale_log2=_SCALE_LOG2)
 
     @property
     def _all_clocks(self):
@@ -69,8 +99,9 @@ class BoardPins(Elaboratable):
             m.domains += [ClockDomain(clock.domain, reset_less=not clock.reset) for clock in clocks]
         # By this name what is reported of parts finds them, see boards.packing.
         m.submodules.component = top = self._top
-        self._serial(m, platform, top)
-        self._sdram(m, platform, top.pins)
+        if self._scene is None:
+            self._serial(m, platform, top)
+            self._sdram(m, platform, top.pins)
         self._screen(m, platform, top.pairs)
         for number, lamp in enumerate(top.lamps):
             m.submodules[f"lamp{number}"] = buffer = io.Buffer("o", platform.request("led", number, dir="-"))

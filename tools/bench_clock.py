@@ -9,15 +9,10 @@ __all__ = ["built_clock"]
 _GRADE = 6
 
 
-def _rows(value):
-    """All objects in JSON that have a clock."""
-    if isinstance(value, dict):
-        if "fmax_mhz" in value:
-            yield value
-        value = list(value.values())
-    if isinstance(value, list):
-        for part in value:
-            yield from _rows(part)
+def _board_rows(report):
+    """The chip's clock by each seed, of a report of tools.build_report."""
+    return [{"grade": report["grade"], "seed": seed["seed"], "fmax_mhz": seed["mhz"]}
+            for seed in report["clocks"]["chip"]["seeds"]]
 
 
 def built_clock(folder):
@@ -33,7 +28,7 @@ def built_clock(folder):
     BadInput
         If neither has a clock.
     """
-    for name, part in (("ulx3s_85f.json", None), ("pipeline.json", "clock")):
+    for name, rows_of in (("ulx3s_85f.json", _board_rows), ("pipeline.json", lambda found: found.get("clock", []))):
         path = folder / name
         if not path.exists():
             continue
@@ -41,11 +36,10 @@ def built_clock(folder):
             found = json.loads(path.read_text())
         except ValueError as error:
             raise BadInput(f"{path}: is not JSON ({error}); measure it anew") from error
-        rows = [row for row in _rows(found if part is None else found.get(part, []))
-                if row.get("grade", _GRADE) == _GRADE]
+        rows = [row for row in rows_of(found) if row.get("grade", _GRADE) == _GRADE]
         if rows:
             slowest = min(rows, key=lambda row: row["fmax_mhz"])
             about = ", ".join(f"{what} {slowest[what]}" for what in ("chip", "grade", "seed") if what in slowest)
-            return slowest["fmax_mhz"], f"{name}: {about or 'worst seed'}"
+            return slowest["fmax_mhz"], f"{name}: {about}"
     raise BadInput(f"{folder}: neither ulx3s_85f.json nor pipeline.json has a clock of speed grade {_GRADE}; measure "
                    "one with dynrt pipeline --only clock")

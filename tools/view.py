@@ -11,7 +11,7 @@ from .board_options import link_options, linked, prepared
 from .errors import clear_errors
 from .options import CAMERA, camera_of
 
-__all__ = ["moved", "view"]
+__all__ = ["moved", "orbit", "view"]
 
 #: What a key does: steps to the right, up and forward, and turns to the right and up in degrees.
 _KEYS = {
@@ -50,7 +50,7 @@ def moved(camera, key, *, step):
     return replace(camera, eye=eye, at=eye + forward * np.linalg.norm(at - camera.eye))
 
 
-def _orbit(camera, number, frames):
+def orbit(camera, number, frames):
     """The camera on its way round what it looks at."""
     eye, at, up = (np.asarray(each, float) for each in (camera.eye, camera.at, camera.up))
     return replace(camera, eye=at + _turned(eye - at, up / np.linalg.norm(up), 360 * number / frames))
@@ -82,7 +82,7 @@ def _poses(scene, first, is_given, frames):
             posed = scene.at_time(scene.duration * number / frames)
             yield posed, first if is_given else posed.default_camera()
         else:
-            yield scene, _orbit(first, number, frames)
+            yield scene, orbit(first, number, frames)
 
 
 def _typed(scene, camera, console):

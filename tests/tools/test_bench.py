@@ -182,8 +182,9 @@ def test_other_rays_are_the_pipelines(docs, drawn):
 
 
 def test_a_board_that_is_built_has_the_clock(docs, drawn):
-    (docs / "results" / "ulx3s_85f.json").write_text(json.dumps({"seeds": [
-        {"seed": 1, "fmax_mhz": 105.0}, {"seed": 2, "fmax_mhz": 101.5}]}))
+    (docs / "results" / "ulx3s_85f.json").write_text(json.dumps({"grade": 6, "clocks": {
+        "pixel": {"seeds": [{"seed": 1, "mhz": 90.0}]},
+        "chip": {"seeds": [{"seed": 1, "mhz": 105.0}, {"seed": 2, "mhz": 101.5}]}}}))
     assert run(docs, "--only", "Scene6", "--chip", "paper", "--part", "simple", "--size", "16x12").exit_code == 0
     row, = results_of(docs)["rows"]
     assert (row["clock_mhz"], row["clock_source"]) == (101.5, "ulx3s_85f.json: seed 2")

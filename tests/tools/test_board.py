@@ -2,13 +2,14 @@
 
 import json
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from boards.bitstream import Routed
+from boards.bitstream import Routed, board_design
 from boards.catalog import BOARDS
 from boards.critical_path import CriticalPath
 from boards.packing import Area
@@ -20,6 +21,7 @@ from sim.scene.compile import CompiledScene
 from tests.sim.host.test_loader import DrawingBoard
 from tools import build as build_module
 from tools.build_report import built, missed, unit_of
+from tools.built_in import built_in_scene
 from tools.cli import main
 from tools.view import moved
 
@@ -193,3 +195,33 @@ def test_a_clock_that_cannot_be(tmp_path):
     result = run("build", BOARD.name, "--clock", 160, "-o", tmp_path)
     assert result.exit_code == 2
     assert result.stderr.endswith("Error: --clock: the clock is 160 MHz; the SDRAM takes up to 133.3\n")
+
+
+def test_a_scene_in_a_bitstream(tmp_path, monkeypatch):
+    """Its memories are the image's, and its cameras go round."""
+    config = replace(BOARD.config, num_threads=2)
+    scene = built_in_scene("room", config, width=128)
+    compiled = CompiledScene(load_scene("room"), fmt=config.fmt, stack_depth=config.stack_depth,
+                             index_width=config.index_width, flatten=True)
+    image = compiled.image(load_scene("room"), eye=load_scene("room").default_camera().eye)
+    assert {name: len(words) for name, words in scene.memories.items()} == {
+        name: getattr(image, name).size for name in ("nodes", "lists", "matrices", "shading")}
+    assert scene.memories["nodes"] == np.ravel(image.nodes).tolist()
+    assert scene.root == image.root
+    assert len(set(scene.cameras)) == len(scene.cameras) == 32
+    design, clocks = board_design(BOARD, config=config, clock_mhz=50, scene=scene)
+    assert "sdram" not in design.files["top.lpf"]
+    assert "uart" not in design.files["top.lpf"]
+    assert set(clocks) == {"sync", "pixel", "shift"}
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (("ulx3s_85f", "--scene", "room"), "Error: --scene: a chip with its scene in block RAM draws simple shading; use a "
+                                       "--chip without a shader\n"),
+    (("ulx3s_25f", "--scene", "room", "--docs", "docs"), "Error: --docs: the tables are of boards with host and SDRAM; "
+                                                         "leave --scene or --docs out\n"),
+])
+def test_scenes_that_cannot_be_built_in(arguments, message, tmp_path):
+    result = run("build", *arguments, "-o", tmp_path)
+    assert result.exit_code == 2
+    assert result.stderr.endswith(message)
