@@ -187,7 +187,7 @@ def test_a_board_that_is_built_has_the_clock(docs, drawn):
         "chip": {"seeds": [{"seed": 1, "mhz": 105.0}, {"seed": 2, "mhz": 101.5}]}}}))
     assert run(docs, "--only", "Scene6", "--chip", "paper", "--part", "simple", "--size", "16x12").exit_code == 0
     row, = results_of(docs)["rows"]
-    assert (row["clock_mhz"], row["clock_source"]) == (101.5, "ulx3s_85f.json: seed 2")
+    assert (row["clock_mhz"], row["clock_source"]) == (101.5, "ulx3s_85f.json: grade 6, seed 2")
 
 
 def test_a_pixel_that_differs_is_counted(monkeypatch, drawn):
