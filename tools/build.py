@@ -30,8 +30,7 @@ _BUILT_IN_WIDTH = 128
 @chip_option
 @click.option("--scene", help="Build a chip with this scene in its block RAM, which goes round it for ever on the "
               "screen, 128x96 pixels, without host and SDRAM")
-@click.option("--clock", "clock_mhz", type=click.FloatRange(min=10), help="MHz of chip and SDRAM  [default: what the "
-              "board's own chip has been seen to reach]")
+@click.option("--clock", "clock_mhz", type=click.FloatRange(min=10), help="MHz of chip and SDRAM  [default: 50]")
 @click.option("--seeds", type=click.IntRange(1), default=1, show_default=True, help="Placements to try; the fastest "
               "becomes the bitstream, the report has all")
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), help="Folder to write BOARD.bit, "
