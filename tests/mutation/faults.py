@@ -220,7 +220,7 @@ _BY_FILE = {
         ('"is_negative": lambda a: a.sign & a.exp.any()', '"is_negative": lambda a: a.sign', "-0 is negative"),
         ("cycles=later - earlier)", "cycles=later - times[0])",
          "a value is delayed from its arrival at every tap"),
-        ("cycles=node.arrival - node.start)", "cycles=node.arrival - node.start - 1)",
+        ("else node.arrival - node.start", "else node.arrival - node.start - 1",
          "a slow choice is a cycle early"),
         ('"select": lambda flag, a, b: Mux(flag, Value.cast(a), Value.cast(b))',
          '"select": lambda flag, a, b: Mux(flag, Value.cast(b), Value.cast(a))', "a choice the other way round"),
