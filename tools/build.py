@@ -21,9 +21,6 @@ from .results import json_text, write_texts
 
 __all__ = ["build"]
 
-#: Pixels of a row of a picture in block RAM
-_BUILT_IN_WIDTH = 128
-
 
 @click.command()
 @board_argument
@@ -53,7 +50,7 @@ def build(board, parameters, scene, clock_mhz, seeds, output, docs):
             check_board_page(docs)
         target = clock_mhz or chosen.clock_mhz
         try:
-            built_in = None if scene is None else built_in_scene(scene, config, width=_BUILT_IN_WIDTH)
+            built_in = None if scene is None else built_in_scene(scene, config, mode=chosen.mode)
             design, clocks = board_design(chosen, config=config, clock_mhz=target, scene=built_in)
         except ValueError as error:
             raise BadInput(f"--clock: {error}") from error
@@ -77,9 +74,9 @@ def build(board, parameters, scene, clock_mhz, seeds, output, docs):
         if failed := missed(routed, clocks):
             raise Failure(f"{board}: {failed}; report.json has its slowest path. Ask for a slower --clock, or for more "
                           "--seeds")
-        best = max((each for each in routed if not missed([each], clocks)), key=lambda each: each.mhz["sync"])
+        best = max((each for each in routed if not each.too_slow(clocks)), key=lambda each: each.mhz["sync"])
         with written_whole(output / f"{board}.bit") as path:
-            path.write_bytes(pack_bitstream(chosen, design, seed=best.seed, target_mhz=target))
+            path.write_bytes(pack_bitstream(chosen, design, seed=best.seed, target_mhz=target, clocks=clocks))
         then = f", then dynrt load SCENE --port ... --chip {output / 'chip.json'}" if scene is None else ""
         console.print(f"{output / f'{board}.bit'}: seed {best.seed}, the chip at {clocks['sync']:g} MHz; load it with "
                       f"openFPGALoader{then}", markup=False, soft_wrap=True)

@@ -27,11 +27,11 @@ def unit_of(path):
 
 def missed(routed, clocks):
     """Why none of the placements will do, "" if one will."""
-    if any(all(each.mhz[domain] >= clocks[domain] for domain in each.mhz) for each in routed):
+    if not all(each.too_slow(clocks) for each in routed):
         return ""
     best = max(routed, key=lambda each: min(each.mhz[domain] / clocks[domain] for domain in each.mhz))
     slow = [f"{_NAMES.get(domain, domain)} reaches {mhz:.1f} of {clocks[domain]:g} MHz"
-            for domain, mhz in best.mhz.items() if mhz < clocks[domain]]
+            for domain, mhz in best.too_slow(clocks).items()]
     return f"timing is not met by {len(routed)} placement{'s' if len(routed) > 1 else ''}: {', '.join(slow)}"
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from boards.pins import BuiltInScene
+from boards.pins import BUILT_IN_SCALE_LOG2, BuiltInScene
 from rtl.memory_ports import memory_ports
 from sim.machine.machine import camera_words, memory_words
 from sim.scene import load_scene
@@ -17,7 +17,7 @@ __all__ = ["built_in_scene"]
 _VIEWS = 32
 
 
-def built_in_scene(name, config, *, width):
+def built_in_scene(name, config, *, mode):
     """A scene, flat, and cameras round what its own looks at.
 
     Parameters
@@ -26,8 +26,8 @@ def built_in_scene(name, config, *, width):
         As ``dynrt render`` takes it.
     config : ChipConfig
         The chip.
-    width : int
-        Of the picture.
+    mode : VideoMode
+        Of the screen.
 
     Raises
     ------
@@ -42,7 +42,8 @@ def built_in_scene(name, config, *, width):
                              flatten=True)
     camera = scene.default_camera()
     image = compiled.image(scene, eye=camera.eye)
-    views = [camera_words(image, orbit(camera, number, _VIEWS), width) for number in range(_VIEWS)]
+    views = [camera_words(image, orbit(camera, number, _VIEWS), mode.width >> BUILT_IN_SCALE_LOG2)
+             for number in range(_VIEWS)]
     return BuiltInScene(
         memories={port: np.ravel(memory_words(image, port, config)).tolist() for port in memory_ports(config)},
         cameras=[sum(int(word) << 32 * place for place, word in enumerate(words)) for words in views],

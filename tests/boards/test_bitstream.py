@@ -10,8 +10,10 @@ from dataclasses import replace
 import pytest
 
 from boards import bitstream
-from boards.bitstream import board_design
+from boards.bitstream import Routed, board_design
 from boards.catalog import BOARDS
+from boards.design import Design
+from boards.toolchain import ToolError
 from rtl.config import ChipConfig
 
 #: Quick to elaborate
@@ -62,3 +64,16 @@ def test_what_cannot_be():
     ("$glbnet$clk", "sync"), ("clk", "sync"), ("$glbnet$pixel_clk", "pixel"), ("shift_clk", "shift")])
 def test_nets_of_clocks(net, domain):
     assert bitstream._domain(net) == domain
+
+
+def test_what_is_too_slow_is_not_packed(monkeypatch):
+    """However it was placed: nextpnr itself is told to go on, so that the report has all seeds."""
+    board = BOARDS["ulx3s_85f"]
+    mhz = {"sync": 49.9, "pixel": 70.0, "shift": 330.0}
+    routed = Routed(seed=3, mhz=mhz, path=None, areas={})
+    monkeypatch.setattr(bitstream, "route", lambda *arguments, **options: routed)
+    clocks = {"sync": 50.0, "sdram": 50.0, "pixel": 65.0, "shift": 325.0}
+    assert routed.too_slow(clocks) == {"sync": 49.9}
+    assert routed.too_slow(clocks | {"sync": 49.0}) == {}
+    with pytest.raises(ToolError, match=r"^small, seed 3: timing is not met in sync; there is no bitstream$"):
+        bitstream.pack_bitstream(board, Design(name="small", files={}, script=""), seed=3, target_mhz=50, clocks=clocks)

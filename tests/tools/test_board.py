@@ -172,7 +172,7 @@ def test_build_writes_a_bitstream_only_if_it_is_fast_enough(mhz, tmp_path, monke
 
     monkeypatch.setattr(build_module, "synthesise", lambda design: None)
     monkeypatch.setattr(build_module, "route", route)
-    monkeypatch.setattr(build_module, "pack_bitstream", lambda board, design, *, seed, target_mhz: bytes([seed]))
+    monkeypatch.setattr(build_module, "pack_bitstream", lambda board, design, *, seed, **others: bytes([seed]))
     output = tmp_path / "out"
     result = run("build", BOARD.name, "--chip", "num_threads=2", "--seeds", 3, "-o", output)
     assert placed == [1, 2, 3]
@@ -200,7 +200,7 @@ def test_a_clock_that_cannot_be(tmp_path):
 def test_a_scene_in_a_bitstream(tmp_path, monkeypatch):
     """Its memories are the image's, and its cameras go round."""
     config = replace(BOARD.config, num_threads=2)
-    scene = built_in_scene("room", config, width=128)
+    scene = built_in_scene("room", config, mode=BOARD.mode)
     compiled = CompiledScene(load_scene("room"), fmt=config.fmt, stack_depth=config.stack_depth,
                              index_width=config.index_width, flatten=True)
     image = compiled.image(load_scene("room"), eye=load_scene("room").default_camera().eye)
