@@ -2,13 +2,27 @@
 
 import json
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 
 from .harness import is_of_harness
 
 __all__ = ["absorb_registers", "free_carry_ends"]
 
 _NEVER, _ALWAYS = ["0"], ["1"]
+
+
+def _readers(module):
+    """Of each bit, who takes it: cell and port by their names, None for a port of the module."""
+    readers = defaultdict(list)
+    for port in module["ports"].values():
+        for bit in port["bits"]:
+            readers[bit].append(None)
+    for name, cell in module["cells"].items():
+        for port, bits in cell["connections"].items():
+            if cell["port_directions"][port] != "output":
+                for bit in bits:
+                    readers[bit].append((name, port))
+    return readers
 
 
 def _passes_no_carry(cell):
@@ -29,16 +43,12 @@ def free_carry_ends(text):
     """
     netlist = json.loads(text)
     for module in netlist["modules"].values():
-        used = Counter(bit for port in module["ports"].values() for bit in port["bits"])
-        for cell in module["cells"].values():
-            for port, bits in cell["connections"].items():
-                if cell["port_directions"][port] != "output":
-                    used.update(bits)
+        readers = _readers(module)
         for cell in module["cells"].values():
             if cell["type"] != "CCU2C":
                 continue
             ends = cell["connections"]
-            if not any(used[bit] for bit in ends.get("COUT", [])):
+            if not any(readers[bit] for bit in ends.get("COUT", [])):
                 ends["COUT"] = ["x"]
             if ends["CIN"] == ["0"] and _passes_no_carry(cell):
                 ends["CIN"] = ["x"]
@@ -59,15 +69,7 @@ def absorb_registers(text):
     netlist = json.loads(text)
     for module in netlist["modules"].values():
         cells = module["cells"]
-        readers = defaultdict(list)
-        for port in module["ports"].values():
-            for bit in port["bits"]:
-                readers[bit].append(None)
-        for name, cell in cells.items():
-            for port, bits in cell["connections"].items():
-                if cell["port_directions"][port] != "output":
-                    for bit in bits:
-                        readers[bit].append((name, port))
+        readers = _readers(module)
         for memory in [cell for cell in cells.values() if cell["type"] == "DP16KD"]:
             for side, outputs in _read_ports(memory).items():
                 registers = _registers_behind(cells, readers, memory, side, outputs)
