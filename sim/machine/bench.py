@@ -14,6 +14,7 @@ from rtl.observation import UNITS
 from rtl.write_out import pixel_layout
 
 from .build import chip_library
+from .simulation import Simulation
 
 __all__ = ["MEMORIES", "Bench", "HangError", "SimulationError"]
 
@@ -35,7 +36,7 @@ def _array(array, kind):
     return array.ctypes.data_as(POINTER(kind))
 
 
-class Bench:
+class Bench(Simulation):
     """A Verilated chip with its memories.
 
     Parameters
@@ -70,18 +71,6 @@ class Bench:
         self._memories = {}
         for number in range(len(MEMORIES)):
             library.bench_latency(self._bench, number, c_uint32(latency), c_uint32(jitter), c_uint32(seed))
-
-    def close(self):
-        """Ends the simulation, and the waveform with it."""
-        if self._bench:
-            self._library.bench_delete(self._bench)
-            self._bench = None
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *exception):
-        self.close()
 
     def load(self, name, words):
         """Puts ``words`` (uint32) into one of :data:`MEMORIES`."""

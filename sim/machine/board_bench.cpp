@@ -69,20 +69,21 @@ struct Bench {
         : cable{divisor}, sync_period(sync_period), shift_period(shift_period), sheet(sdram::datasheets[sheet]) {
         chip = std::make_unique<Vcomponent>(&context);
         chip->rx = 1;
+        memory.emplace(sheet, double(sync_period) / 1000);
         reset(4);
     }
 
     ~Bench() { chip->final(); }
 
     // The SDRAM is not reset, but not refreshed either, and rows stay open: as after power-up it must be initialised.
+    // What was on its way to it when the reset came still arrives.
     void reset(int cycles) {
-        std::vector<uint16_t> contents;
-        if (memory) contents = std::move(memory->contents);
-        memory.emplace(sheet, double(sync_period) / 1000);
-        if (!contents.empty()) memory->contents = std::move(contents);
         chip->rst = chip->pixel_rst = chip->shift_rst = 1;
         for (int number = 0; number < cycles; ++number) tick();
         chip->rst = chip->pixel_rst = chip->shift_rst = 0;
+        auto contents = std::move(memory->contents);
+        memory.emplace(sheet, double(sync_period) / 1000);
+        memory->contents = std::move(contents);
     }
 
     // The shift clock; the pixel clock rises between two of its edges.

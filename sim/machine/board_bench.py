@@ -14,6 +14,7 @@ from .bench import SimulationError
 from .component_build import component_library
 from .dvi_receiver import DviReceiver, unpacked
 from .sdram_bench import PARTS
+from .simulation import Simulation
 
 __all__ = ["SimulatedBoard"]
 
@@ -23,7 +24,7 @@ _CHUNK = 1 << 16
 _STRIDE = 1 << 14
 
 
-class SimulatedBoard:
+class SimulatedBoard(Simulation):
     """A Verilated :class:`~rtl.top.Top`; a port for a :class:`~sim.host.driver.Driver`, in the board's own time.
 
     Parameters
@@ -68,18 +69,6 @@ class SimulatedBoard:
         self._buffer = (c_uint8 * _CHUNK)()
         # Come while the screen was watched
         self._earlier = b""
-
-    def close(self):
-        """Ends the simulation."""
-        if self._bench:
-            self._library.bench_delete(self._bench)
-            self._bench = None
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *exception):
-        self.close()
 
     def run(self, cycles, *, until_byte=False):
         """Goes on for so many cycles, or until a byte has come.
