@@ -203,7 +203,9 @@ def test_a_program_without_a_stack_has_none():
         await ctx.tick()
         ctx.set(dut.i.instruction.op, Op.MOVE)
         ctx.set(dut.i.instruction.mask, 5)
-        await ctx.tick().repeat(ControlUnit.latency)
+        await ctx.tick().repeat(ControlUnit.latency - 1)
+        assert ctx.get(dut.o.result.token.counter) == 0
+        await ctx.tick()
         result = ctx.get(dut.o.result)
         assert (list(result.value), result.mask) == ([1, 2, 3], 5)
         checked.append(result)
