@@ -2,6 +2,7 @@
 
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import wraps
 
 import click
 
@@ -49,13 +50,12 @@ class Link:
 
 def link_options(command):
     """The options of a command that talks to a board, which it gets as ``link``."""
+    @wraps(command)
     def run(board, parameters, port, baud, timeout, **others):
         board = BOARDS[board]
         return command(link=Link(board=board, config=board_chip(board, parameters), port=port, baud=baud,
                                  timeout=timeout), **others)
 
-    run.__name__, run.__doc__ = command.__name__, command.__doc__
-    run.__click_params__ = getattr(command, "__click_params__", [])
     for option in (
             click.option("--timeout", type=click.FloatRange(min=0.01), default=0.25, show_default=True,
                          help="Seconds for an answer; a simulated board takes longer"),
@@ -87,8 +87,8 @@ def linked(link, *, progress):
         raise Failure(str(error)) from error
 
 
-def prepared(scene, link, *, background):
-    """A scene for a board's chip.
+def prepared(scene, config, *, size, background):
+    """A scene for a board's chip, and for pictures of a size.
 
     Returns
     -------
@@ -98,8 +98,7 @@ def prepared(scene, link, *, background):
         By which the model draws the same.
     """
     loaded = load_scene(scene)
-    config = link.config
-    order = Order(engine="model", size=link.board.size, config=config, background=background,
+    order = Order(engine="model", size=size, config=config, background=background,
                   shading="simple" if config.shader is None else "full",
                   depth=0 if config.shader is None else config.shader.depth)
     compiled = CompiledScene(loaded, fmt=config.fmt, stack_depth=config.stack_depth, index_width=config.index_width)

@@ -11,7 +11,7 @@ from boards.toolchain import ToolError
 from sim.machine import BuildError, SimulationError
 from sim.scene import SceneError
 
-__all__ = ["BadInput", "Failure", "clear_errors", "written_whole"]
+__all__ = ["BadInput", "Failure", "check_folders", "clear_errors", "written_whole"]
 
 
 class BadInput(click.ClickException):
@@ -35,6 +35,19 @@ def clear_errors():
         raise BadInput(str(error)) from error
     except (BuildError, SimulationError, ToolError) as error:
         raise Failure(str(error)) from error
+
+
+def check_folders(*paths):
+    """Sees, before the long work, that what is to be written has folders to be in; None is nothing.
+
+    Raises
+    ------
+    BadInput
+        If one has not.
+    """
+    for path in paths:
+        if path is not None and not path.parent.is_dir():
+            raise BadInput(f"{path}: there is no folder {path.parent}")
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from sim.scene import load_scene
 
 from .chip_file import chip_text
 from .engines import progress_on
-from .errors import BadInput, clear_errors
+from .errors import check_folders, clear_errors
 from .fit_chip import Fitting
 from .fit_page import check_page, fitted_page
 from .options import CAMERA, QUALITY, SIZE, camera_of
@@ -62,8 +62,7 @@ def fit(scene, output, docs, quality, size, camera, view, frames, shading, depth
     output = output or Path(f"{name}-chip.json")
     if output.suffix.lower() != ".json":
         raise click.UsageError(f"-o: {output.name} must end in .json")
-    if not output.parent.is_dir():
-        raise BadInput(f"{output}: there is no folder {output.parent}")
+    check_folders(output)
     console = Console(stderr=True, highlight=False)
 
     def tell(text):

@@ -9,7 +9,7 @@ from rich.console import Console
 from .animation import save_picture
 from .board_options import link_options, linked, prepared
 from .engines import model_picture
-from .errors import BadInput, clear_errors, written_whole
+from .errors import check_folders, clear_errors, written_whole
 from .options import CAMERA, camera_of
 
 __all__ = ["load"]
@@ -26,11 +26,10 @@ __all__ = ["load"]
               "the board's memory, which is compared with the model's")
 def load(scene, link, camera, view, background, output):
     """Send SCENE (as dynrt render takes it) to a board, real or simulated, and draw it there."""
-    if output is not None and not output.parent.is_dir():
-        raise BadInput(f"{output}: there is no folder {output.parent}")
+    check_folders(output)
     console = Console(stderr=True, highlight=False)
     with clear_errors():
-        loaded, compiled, order = prepared(scene, link, background=background)
+        loaded, compiled, order = prepared(scene, link.config, size=link.board.size, background=background)
         chosen = camera_of(loaded, camera, view)
         image = compiled.image(loaded, eye=chosen.eye, is_full=order.is_full, background=background)
         for warning in [*loaded.warnings, *compiled.warnings]:

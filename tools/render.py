@@ -18,7 +18,7 @@ from sim.scene.texture import decode_texture
 
 from .animation import frame_durations, save_animation, save_picture
 from .engines import ENGINES, MEMORIES, Order, draw, model_picture, progress_on
-from .errors import BadInput, clear_errors, written_whole
+from .errors import BadInput, check_folders, clear_errors, written_whole
 from .options import CAMERA, CHIP, CYCLES, FORMAT, PIXEL, SIZE, camera_of, chip_config
 
 __all__ = ["render"]
@@ -83,9 +83,7 @@ def render(scene, output, engine, size, fmt, camera, view, frames, shading, dept
                   wave_pixels=wave_pixels)
     output = output or Path(f"{Path(scene).name.split('.')[0]}.png")
     _check_options(order, output, frames, hits)
-    for path in (output, wave, hits, report):
-        if path is not None and not path.parent.is_dir():
-            raise BadInput(f"{path}: there is no folder {path.parent}")
+    check_folders(output, wave, hits, report)
     console = Console(stderr=True, highlight=False)
     with clear_errors(), contextlib.ExitStack() as files:
         loaded = load_scene(scene)

@@ -13,7 +13,7 @@ from sim.machine.dvi_receiver import DviError
 from .animation import save_picture
 from .board_options import board_argument, board_chip, chip_option
 from .engines import progress_on
-from .errors import BadInput, Failure, clear_errors, written_whole
+from .errors import Failure, check_folders, clear_errors, written_whole
 
 __all__ = ["simulated"]
 
@@ -34,8 +34,7 @@ def simulated(board, parameters, screen, pictures):
     same --board and --chip, and --timeout 60.
     """
     chosen = BOARDS[board]
-    if screen is not None and not screen.parent.is_dir():
-        raise BadInput(f"{screen}: there is no folder {screen.parent}")
+    check_folders(screen)
     console = Console(stderr=True, highlight=False)
     with clear_errors():
         with progress_on(console, "compiling the board") as progress:

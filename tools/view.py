@@ -69,7 +69,7 @@ def view(scene, link, camera, background, frames):
     """Look around in SCENE on a board, real or simulated, by keys: the picture is on the board's screen."""
     console = Console(stderr=True, highlight=False)
     with clear_errors():
-        loaded, compiled, order = prepared(scene, link, background=background)
+        loaded, compiled, order = prepared(scene, link.config, size=link.board.size, background=background)
         first = camera_of(loaded, camera, None)
         poses = _poses(loaded, first, camera is not None, frames) if frames else _typed(loaded, first, console)
         with linked(link, progress=lambda done, total: None) as board:
@@ -101,7 +101,7 @@ def _typed(scene, camera, console):
 
 def _show(board, compiled, order, poses, background, console):
     """Each picture; what the next one needs is written while the last one is drawn."""
-    image, slot, begin, number, counters = None, 0, time.monotonic(), 0, None
+    image, slot, number, begin = None, 0, 0, time.monotonic()
     for scene, camera in poses:
         seen = {"eye": camera.eye, "is_full": order.is_full}
         if image is None:
@@ -111,7 +111,7 @@ def _show(board, compiled, order, poses, background, console):
             slot ^= 1
             update = compiled.update(scene, slot=slot, **seen)
             board.update(update.ahead)
-            counters = board.wait()
+            board.wait()
             board.update(update.between)
             image = image.updated(update)
         board.start(image, camera, background=background)

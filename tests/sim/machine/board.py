@@ -10,11 +10,10 @@ from boards.catalog import BOARDS
 from sim.host import Driver
 from sim.host.loader import Loader
 from sim.machine.board_bench import SimulatedBoard
-from sim.scene import load_scene
-from tools.board_options import Link, prepared
+from tools.board_options import board_chip, prepared
 from tools.engines import model_picture
 from tools.errors import written_whole
-from tools.options import CHIP, chip_config
+from tools.options import CHIP
 from tools.results import json_text, write_texts
 
 __all__ = ["shown"]
@@ -28,8 +27,7 @@ def shown(board, config, scene, *, divisor, progress):
     picture : uint8[H, W, 3]
     report : dict
     """
-    link = Link(board=board, config=config, port="", baud=None, timeout=0)
-    loaded, compiled, order = prepared(scene, link, background=(0, 0, 0))
+    loaded, compiled, order = prepared(scene, config, size=board.size, background=(0, 0, 0))
     camera = loaded.default_camera()
     image = compiled.image(loaded, eye=camera.eye, is_full=order.is_full)
     with SimulatedBoard(config, clock_mhz=board.clock_mhz, mode=board.mode, scale=board.scale, divisor=divisor,
@@ -68,9 +66,8 @@ def shown(board, config, scene, *, divisor, progress):
 def main(board, parameters, scene, divisor, output):
     """Draw a scene on a simulated board, and compare its screen with the model."""
     chosen = BOARDS[board]
-    config = chip_config(None, parameters) if parameters else chosen.config
-    load_scene(scene)
-    picture, report = shown(chosen, config, scene, divisor=divisor, progress=lambda text: click.echo(text, err=True))
+    picture, report = shown(chosen, board_chip(chosen, parameters), scene, divisor=divisor,
+                            progress=lambda text: click.echo(text, err=True))
     with written_whole(output / "screen.png") as path:
         Image.fromarray(np.ascontiguousarray(picture)).save(path, format="PNG", optimize=True)
     write_texts({output / "board.json": json_text(report)})
