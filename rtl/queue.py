@@ -8,8 +8,14 @@ from .block_memory import BlockMemory
 
 __all__ = ["Merge", "Queue", "merged"]
 
-#: Elements for which two distributed memories of ECP5 in a row are less than the block RAM is worth.
-_DISTRIBUTED_DEPTH = 32
+#: Elements of a distributed memory of ECP5, of two in a row, and bits of a block RAM's word.
+_ONE, _TWO, _WORD = 16, 32, 36
+
+
+def _belongs_in_block(width, depth):
+    """Whether block RAM is worth it: for what one distributed memory does not hold only if it is well used."""
+    return depth > _TWO or (depth > _ONE and width / (-(-width // _WORD) * _WORD) > 2 / 3)
+
 
 
 class Queue(wiring.Component):
@@ -28,8 +34,8 @@ class Queue(wiring.Component):
         The writer does not look at ``ready``, having other grounds to know that there is room: a token queue
         as deep as there are threads, say. That it is right is asserted in simulation.
     block : bool or None
-        Whether block RAM keeps them; by default if they are more than the 32 of two distributed memories and one
-        in the register.
+        Whether block RAM keeps them. By default what is more than the 32 elements of two distributed memories, and
+        one in the register; and what is more than 16 and one if its words fill two thirds of block RAMs'.
 
     Members
     -------
@@ -40,7 +46,7 @@ class Queue(wiring.Component):
     def __init__(self, shape, *, depth, always_ready=False, block=None):
         self._width = Shape.cast(shape).width
         self._depth = depth
-        self._block = depth > _DISTRIBUTED_DEPTH + 1 if block is None else block
+        self._block = _belongs_in_block(self._width, depth - 1) if block is None else block
         super().__init__({
             "i": In(stream.Signature(shape, always_ready=always_ready)),
             "o": Out(stream.Signature(shape)),

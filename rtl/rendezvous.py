@@ -31,7 +31,7 @@ class Rendezvous(wiring.Component):
     """Starts a packet when the last of its rays has stopped, and hands its rays back when they are traced.
 
     A ray stops to be traced or for good; a packet with rays to trace goes to traversal with those, one without is
-    finished. One ray stops a cycle.
+    finished. One ray stops a cycle; what follows is said ``latency`` cycles later.
 
     Parameters
     ----------
@@ -59,6 +59,9 @@ class Rendezvous(wiring.Component):
     may_end : there is room for one that ends
     finished : stream of tokens: the packet's thread is free
     """
+
+    #: From the last ray of a packet that stops to its start or end.
+    latency = 2
 
     def __init__(self, *, fmt, num_threads, stack_depth, index_width, program, ray_stack_depth, bank_bits=0):
         self._fmt = fmt
@@ -110,50 +113,74 @@ class Rendezvous(wiring.Component):
         return m
 
     def _count(self, m, stop, accept):
-        """Which rays of the packet have stopped, and what follows when all have."""
+        """Which rays of the packet have stopped, and what follows when all have: in the cycle after one stops."""
+        thread = stop.token.thread[self._bank_bits:]
+        # Origins are apart, as what is written there does not depend on what was: they are compared a cycle earlier.
+        m.submodules.origins = origins = memory.Memory(shape=len(stop.x[2]), depth=self._num_slots, init=[])
+        origin, origin_write = origins.read_port(domain="comb"), origins.write_port()
+        counted = Signal(data.StructLayout({"thread": stop.token.thread.shape(), "is_trace": 1, "flags": 3,
+                                            "stopped": PACKET_RAYS, "same": 1}), reset_less=True)
+        counting = Signal()
+        m.d.comb += [
+            origin.addr.eq(thread),
+            origin_write.addr.eq(thread),
+            origin_write.data.eq(stop.x[2]),
+            origin_write.en.eq(accept & stop.is_trace),
+        ]
+        m.d.sync += [
+            counting.eq(accept),
+            counted.thread.eq(stop.token.thread),
+            counted.is_trace.eq(stop.is_trace),
+            counted.flags.eq(stop.flags),
+            counted.stopped.eq(1 << stop.token.ray),
+            counted.same.eq(origin.data == stop.x[2]),
+        ]
+
         state_layout = data.StructLayout({"running": PACKET_RAYS, "traced": PACKET_RAYS, "hit": PACKET_RAYS,
-                                          "shared": 1, "origin": len(stop.x[2])})
-        m.submodules.states = states = memory.Memory(
-            shape=state_layout, depth=self._num_slots, init=[])
+                                          "shared": 1})
+        m.submodules.states = states = memory.Memory(shape=state_layout, depth=self._num_slots, init=[])
         read, write = states.read_port(domain="comb"), states.write_port()
         before, after = read.data, Signal(state_layout)
-        stopped = Signal(PACKET_RAYS)
         same = Signal()
-        all_stopped, goes_on = Signal(), Signal()
+        all_stopped = Signal()
         m.d.comb += [
-            read.addr.eq(stop.token.thread[self._bank_bits:]),
-            stopped.eq(1 << stop.token.ray),
-            same.eq(stop.flags[TraceFlag.SAME_ORIGIN]
-                    & (~before.traced.any() | before.shared & (before.origin == stop.x[2]))),
-            after.running.eq(before.running & ~stopped),
-            after.traced.eq(before.traced | Mux(stop.is_trace, stopped, 0)),
-            after.hit.eq(before.hit | Mux(stop.is_trace & stop.flags[TraceFlag.HAS_FAR], stopped, 0)),
-            after.shared.eq(Mux(stop.is_trace, same, before.shared)),
-            after.origin.eq(Mux(stop.is_trace, stop.x[2], before.origin)),
-            all_stopped.eq(accept & ~after.running.any()),
-            goes_on.eq(all_stopped & after.traced.any()),
-            self.begin.ready.eq(~accept),
-            write.en.eq(accept | self.begin.valid),
-            write.addr.eq(Mux(accept, stop.token.thread, self.begin.payload.thread)[self._bank_bits:]),
+            read.addr.eq(counted.thread[self._bank_bits:]),
+            same.eq(counted.flags[TraceFlag.SAME_ORIGIN] & (~before.traced.any() | before.shared & counted.same)),
+            after.running.eq(before.running & ~counted.stopped),
+            after.traced.eq(before.traced | Mux(counted.is_trace, counted.stopped, 0)),
+            after.hit.eq(before.hit | Mux(counted.is_trace & counted.flags[TraceFlag.HAS_FAR], counted.stopped, 0)),
+            after.shared.eq(Mux(counted.is_trace, same, before.shared)),
+            all_stopped.eq(counting & ~after.running.any()),
+            self.begin.ready.eq(~counting),
+            write.en.eq(counting | self.begin.valid),
+            write.addr.eq(Mux(counting, counted.thread, self.begin.payload.thread)[self._bank_bits:]),
         ]
         # Between packets only `running` matters: it is what is to come back.
-        with m.If(~accept):
+        with m.If(~counting):
             m.d.comb += write.data.running.eq(self.begin.payload.mask)
         with m.Elif(all_stopped):
             m.d.comb += write.data.running.eq(after.traced)
         with m.Else():
             m.d.comb += write.data.eq(after)
+        goes_on, ends = Signal(), Signal()
+        begun = Signal(data.StructLayout({"thread": counted.thread.shape(), "state": state_layout}), reset_less=True)
+        m.d.sync += [
+            goes_on.eq(all_stopped & after.traced.any()),
+            ends.eq(all_stopped & ~after.traced.any()),
+            begun.thread.eq(counted.thread),
+            begun.state.eq(after),
+        ]
         m.d.comb += [
             self.start.valid.eq(goes_on),
-            self.start.payload.thread.eq(stop.token.thread),
-            self.start.payload.mask.eq(after.traced),
-            self.start.payload.hit.eq(after.hit),
+            self.start.payload.thread.eq(begun.thread),
+            self.start.payload.mask.eq(begun.state.traced),
+            self.start.payload.hit.eq(begun.state.hit),
             self.start.payload.interval.eq(IntervalSource.FRESH),
             self.shared.valid.eq(goes_on),
-            self.shared.thread.eq(stop.token.thread),
-            self.shared.shared.eq(after.shared),
-            self.finished.valid.eq(all_stopped & ~after.traced.any()),
-            self.finished.payload.thread.eq(stop.token.thread),
+            self.shared.thread.eq(begun.thread),
+            self.shared.shared.eq(begun.state.shared),
+            self.finished.valid.eq(ends),
+            self.finished.payload.thread.eq(begun.thread),
         ]
         return states
 

@@ -1,4 +1,4 @@
-"""The rendezvous loses no ray and doubles none, and a packet starts in the cycle in which its last ray stops.
+"""The rendezvous loses no ray and doubles none, and a packet starts once its last ray has stopped, after the latency.
 
 Where each ray is is kept account of. When rays stop and how, when packets are traced, and who waits, is free; that no
 ray is made up, and that offers stand until they are taken, is assumed.
@@ -62,12 +62,16 @@ def rendezvous_proof(*, broken=False):
             Assume(~packet_here | is_traced),
         ]
         going_on = Signal(name=f"going_on{thread}")
+        waiting = Cat(place == Place.WAITING for place in places)
+        has_stopped = Signal(Rendezvous.latency + 1, name=f"has_stopped{thread}")
+        m.d.sync += has_stopped[1:].eq(has_stopped[:-1])
         m.d.comb += [
             going_on.eq(Cat((place == Place.RUNNING) | (place == Place.TRACED) for place in after).any()),
-            Assert(starting + finishing == (stopping & ~going_on)),
-            Assert(~starting | (dut.start.payload.mask == Cat(place == Place.WAITING for place in after))),
+            has_stopped[0].eq(stopping & ~going_on),
+            Assert(starting + finishing == has_stopped[-1]),
+            Assert(~starting | (dut.start.payload.mask == waiting)),
             Assert(~starting | dut.start.payload.mask.any()),
-            Assert(~finishing | ~Cat(place == Place.WAITING for place in after).any()),
+            Assert(~finishing | ~waiting.any()),
         ]
         with m.If(starting):
             m.d.sync += is_traced.eq(1)
@@ -89,7 +93,7 @@ def rendezvous_proof(*, broken=False):
                 m.d.comb += then.eq(Mux(stop.is_trace, Place.WAITING, Place.ENDED))
                 m.d.sync += [kept.counter.eq(stop.token.counter), kept.sp.eq(stop.token.sp ^ broken)]
             m.d.sync += place.eq(then)
-            with m.If(starting & (then == Place.WAITING)):
+            with m.If(starting & (place == Place.WAITING)):
                 m.d.sync += place.eq(Place.TRACED)
             with m.If(finishing):
                 m.d.sync += place.eq(Place.NOWHERE)
@@ -104,10 +108,10 @@ def rendezvous_proof(*, broken=False):
 
 def test_no_ray_is_lost_or_doubled(tmp_path):
     module, ports = rendezvous_proof()
-    prove(module, ports=ports, cycles=9, by_induction=False, folder=tmp_path)
+    prove(module, ports=ports, cycles=10, by_induction=False, folder=tmp_path)
 
 
 def test_a_wrong_claim_is_refuted(tmp_path):
     module, ports = rendezvous_proof(broken=True)
     with pytest.raises(Refuted, match="model found"):
-        prove(module, ports=ports, cycles=6, by_induction=False, folder=tmp_path)
+        prove(module, ports=ports, cycles=8, by_induction=False, folder=tmp_path)

@@ -77,9 +77,10 @@ def stack_proof(*, stack_depth, patience):
     free(dut.push, dut.pop.payload, dut.pop.valid, dut.hit_distances)
     m.d.comb += Assume(~dut.push.valid | (dut.push.token.sp < stack_depth))
     m.d.comb += Assume(~dut.pop.valid | (dut.pop.payload.sp <= stack_depth))
-    # Who pushes holds the thread's token.
+    # Who pushes holds the thread's token, and is not popping with it.
     inside = Signal(NUM_THREADS)
-    m.d.comb += Assume(~(dut.push.valid & inside.bit_select(dut.push.token.thread, 1)))
+    m.d.comb += Assume(~(dut.push.valid & (inside.bit_select(dut.push.token.thread, 1)
+                                           | dut.pop.valid & (dut.pop.payload.thread == dut.push.token.thread))))
     for port, token, is_inside in ((dut.resume, dut.resume.payload.token, 0), (dut.exhausted, dut.exhausted.payload, 0),
                                    (dut.pop, dut.pop.payload, 1)):
         with m.If(port.valid & port.ready):

@@ -68,7 +68,7 @@ class Packets:
         self.stops.append({"token": token, "is_trace": int(is_trace), "flags": flags, "a": a, "x": x})
 
     def stopped(self, stop):
-        """A stop is accepted; what is to follow in the same cycle, a start or an end, or nothing."""
+        """A stop is accepted; what is to follow, a start or an end, or nothing."""
         thread, ray = stop.token.thread, stop.token.ray
         self.running[thread].remove(ray)
         if stop.is_trace:
@@ -131,14 +131,16 @@ def test_rays_wait_for_each_other(seed, num_threads, gap, pace, bank_bits):
         assert limits.any_hit == stop.flags & ANY_HIT
 
     async def log(ctx):
-        """What follows a stop follows in its cycle."""
+        """What follows a stop follows after the latency."""
+        following = deque([None] * Rendezvous.latency)
         async for _, _, begins, begin, stops, stop, start, token, finished, thread, shared, ended in ctx.tick().sample(
                 dut.begin.valid & dut.begin.ready, dut.begin.payload, dut.stop.valid & dut.stop.ready,
                 dut.stop.payload.as_value(), dut.start.valid, dut.start.payload, dut.finished.valid,
                 dut.finished.payload.thread, dut.shared, dut.ended):
             if begins:
                 packets.begun(begin)
-            match packets.stopped(read.unpack(stop)) if stops else None:
+            following.append(packets.stopped(read.unpack(stop)) if stops else None)
+            match following.popleft():
                 case None:
                     assert not start
                     assert not finished
@@ -209,6 +211,6 @@ def test_a_ray_stops_each_cycle_and_comes_back_each_cycle():
 
     cycles = []
     simulate(dut, work, name="rendezvous", ticks=200)
-    assert starts == [0, 0, 0, 1] * 4
+    assert starts == ([0] * Rendezvous.latency + [0, 0, 0, 1] * 4)[:len(every_ray)]
     assert rays == every_ray
     assert cycles == [0] + [1] * len(every_ray)
