@@ -15,6 +15,7 @@ __all__ = ["Circuit"]
 
 #: What a node is in terms of its operands, where that takes no operator.
 _LOGIC = {
+    "register": lambda a: a,
     "neg": lambda a: Cat(a.frac, a.exp, ~a.sign),
     "abs": lambda a: Cat(a.frac, a.exp),
     "is_zero": lambda a: a.exp == 0,

@@ -41,9 +41,9 @@ class Datapath(Graph):
         Format of all floats.
     latencies : dict from str to int
         Latency of ``"add"`` (also subtraction), ``"mul"``, ``"div"``, ``"cmp"``, ``"rec"``, ``"sqrt"``, ``"rsqrt"``,
-        ``"dot"``, ``"select"`` and ``"power"`` (arithmetic on powers), in cycles. Missing ones are the operators' own
-        defaults, or what ``clock_mhz`` asks for; none for ``"select"``, 1 for ``"power"``, of which ``raised`` has
-        twice as many.
+        ``"dot"``, ``"select"``, ``"register"`` and ``"power"`` (arithmetic on powers), in cycles. Missing ones are the
+        operators' own defaults, or what ``clock_mhz`` asks for; none for ``"select"``, 1 for ``"register"`` and
+        ``"power"``, of which ``raised`` has twice as many.
     rounding : Rounding
         How all results are rounded, where there is a choice.
     operators : dict from str to type
@@ -66,7 +66,7 @@ class Datapath(Graph):
     def __init__(self, fmt, *, latencies=None, rounding=Rounding.NEAREST_EVEN, operators=None, guard_width=None,
                  clock_mhz=None):
         latencies, operators = dict(latencies or {}), dict(operators or {})
-        known = {*COUNTED_AS.values(), "select", "power"}
+        known = {*COUNTED_AS.values(), "select", "register", "power"}
         if not latencies.keys() <= known:
             raise ValueError(f"Latencies may be given for {', '.join(sorted(known))}, "
                              f"not for {', '.join(sorted(latencies.keys() - known))}")
@@ -80,7 +80,8 @@ class Datapath(Graph):
         of_powers = dict.fromkeys(("power_max", "power_mul", "power_div"), latencies.get("power", 1))
         # An addition, which has registers in front of it too.
         of_powers["raised"] = 2 * latencies.get("power", 1)
-        super().__init__(fmt, latencies={"select": latencies.get("select", 0), **of_powers})
+        super().__init__(fmt, latencies={"select": latencies.get("select", 0),
+                                         "register": latencies.get("register", 1), **of_powers})
         self._given = latencies
 
     def latency_of_operator(self, op):

@@ -164,6 +164,10 @@ class Graph:
         """a if flag, else b: both floats, or both flags"""
         return self._node("select", flag, a, b, flags=(True, a.is_flag, a.is_flag), is_flag=a.is_flag)
 
+    def register(self, a):
+        """a, from a register, where what makes it and what takes it are too much for one cycle"""
+        return self._node("register", a, flags=a.is_flag, is_flag=a.is_flag)
+
     # Relations
 
     def lt(self, a, b):

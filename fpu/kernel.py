@@ -12,6 +12,7 @@ __all__ = ["compile_kernel", "kernel_source"]
 
 
 _EXPRESSIONS = {
+    "register": "{}",
     "neg": "-{}",
     "abs": "abs({})",
     "is_zero": "{} == 0.0",

@@ -187,25 +187,26 @@ class Intersection(wiring.Component):
         m.submodules.instances = instances = memory.Memory(shape=self._index_width, depth=num_slots, init=[])
         entered_write, instance_read = instances.write_port(), instances.read_port(domain="comb")
         # What is written to the distances: a hit's, or the one that a ray begins with. A record has its t.
-        new = Signal(data.StructLayout({"valid": 1, "thread": done.token.thread.shape(), "ray": range(PACKET_RAYS),
-                                        "t": self._fmt}))
-        m.d.comb += [new.valid.eq(kept), new.thread.eq(done.token.thread), new.ray.eq(done.ray),
-                     new.t.eq(Mux(is_over, self._fmt.const(0.0), found.t))]
-        new_best = Signal(best_layout) if self._tolerance else new.t
+        t = Signal(self._fmt)
+        m.d.comb += t.eq(Mux(is_over, self._fmt.const(0.0), found.t))
+        new_best = Signal(best_layout) if self._tolerance else t
         # What is written is known late in a cycle, and goes in the next.
         place = data.StructLayout({"ray": range(PACKET_RAYS), "thread": done.token.thread.shape()})
-        written = Signal(data.StructLayout({"place": place, "best": best_layout, "record": self._record}),
-                         reset_less=True)
-        is_written, record_is_written = Signal(), Signal()
+        found_write = data.StructLayout({"place": place, "best": best_layout, "record": self._record})
+        kept_hit = Signal(found_write, reset_less=True)
+        has_kept, record_is_kept = Signal(), Signal()
         record_write = Signal(data.StructLayout({"en": 1, "data": self._record}))
         m.d.sync += [
-            is_written.eq(new.valid),
-            record_is_written.eq(record_write.en),
-            written.place.ray.eq(new.ray),
-            written.place.thread.eq(new.thread),
-            written.best.eq(new_best),
-            written.record.eq(record_write.data),
+            has_kept.eq(kept),
+            record_is_kept.eq(record_write.en),
+            kept_hit.place.ray.eq(done.ray),
+            kept_hit.place.thread.eq(done.token.thread),
+            kept_hit.best.eq(new_best),
+            kept_hit.record.eq(record_write.data),
         ]
+        written = Signal(found_write)
+        is_written, record_is_written = Signal(), Signal()
+        m.d.comb += [written.eq(kept_hit), is_written.eq(has_kept), record_is_written.eq(record_is_kept)]
         m.d.comb += [
             entered_write.addr.eq(self.entered.thread),
             entered_write.data.eq(self.entered.index),
@@ -214,14 +215,14 @@ class Intersection(wiring.Component):
             distances.write.valid.eq(is_written),
             distances.write.address.eq(written.place),
             distances.write.data.eq(written.best),
-            record_write.data.t.eq(new.t),
+            record_write.data.t.eq(t),
             record_write.data.u.eq(found.u),
             record_write.data.v.eq(found.v),
             record_write.data.cosine.eq(done.cosine),
             record_write.data.triangle.eq(done.index),
             record_write.data.instance.eq(instance_read.data),
             record_write.data.in_instance.eq(done.token.level),
-            record_write.en.eq(new.valid),
+            record_write.en.eq(kept),
         ]
         for number in range(self._num_readers):
             m.submodules[f"records{number}"] = records = BlockMemory(self._record, depth=PACKET_RAYS * num_slots)
@@ -256,17 +257,22 @@ class Intersection(wiring.Component):
             # So that the shader does not wait within a cycle for whether there is a hit.
             m.submodules.begins = queue = Queue(self.limit.payload.shape(), depth=2)
             wiring.connect(m, wiring.flipped(self.limit), queue.i)
-            begins = queue.o
-            with m.If(~kept):
-                m.d.comb += [new.valid.eq(begins.valid & begins.payload.has_far),
-                             new.thread.eq(begins.payload.thread), new.ray.eq(begins.payload.ray),
-                             new.t.eq(begins.payload.t_far),
-                             record_write.data.triangle.eq(~0)]
+            begins, begin = queue.o, queue.o.payload
+            with m.If(~has_kept):
+                m.d.comb += [
+                    is_written.eq(begins.valid & begin.has_far),
+                    record_is_written.eq(is_written),
+                    written.place.ray.eq(begin.ray),
+                    written.place.thread.eq(begin.thread),
+                    written.record.t.eq(begin.t_far),
+                    written.record.triangle.eq(~0),
+                ]
                 if self._tolerance:
                     infinity = self._fmt.const(math.inf)
-                    m.d.comb += [new_best.key.eq(new.t), new_best.front.eq(infinity), new_best.back.eq(infinity),
-                                 record_write.en.eq(new.valid)]
-            m.d.comb += begins.ready.eq(~kept)
+                    m.d.comb += written.best.eq(Cat(begin.t_far, infinity, infinity))
+                else:
+                    m.d.comb += written.best.eq(begin.t_far)
+            m.d.comb += begins.ready.eq(~has_kept)
             self._limit(m, test, begins, to_ask.o, to_end.o, asks=valid[ask_at], cycles=latency - ask_at,
                         instances=instances, allowed=allowed, is_over=is_over)
         return m

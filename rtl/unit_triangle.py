@@ -58,7 +58,7 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
         margin = dp.power_mul(loss, dp.input("margin", delay=dp.arrival(t)))
         most = dp.const(MAX_MARGIN)
         firm, later = _is_inside(dp, u, v), dp.raised(t, dp.select(dp.is_within(margin, most), margin, most))
-        key = dp.select(firm, t, later)
+        key = dp.register(dp.select(firm, t, later))
         reach = dp.const(REACH)
         front, back = (dp.input(name, delay=dp.arrival(key)) for name in ("soft_front", "soft_back"))
         t_soft = dp.select(dp.sign(direction.z), back, front)

@@ -27,7 +27,8 @@ LOGIC = ["logical_and", "logical_or"]
 def datapaths(draw):
     """Random graphs with a few inputs, some of them late, and several outputs, some of them early."""
     latencies = draw(st.dictionaries(st.sampled_from([
-        "add", "mul", "div", "cmp", "rec", "sqrt", "rsqrt", "dot", "select", "power"]), st.integers(0, 7)))
+        "add", "mul", "div", "cmp", "rec", "sqrt", "rsqrt", "dot", "select", "register",
+        "power"]), st.integers(0, 7)))
     dp = Datapath(FMT, latencies=latencies, rounding=draw(st.sampled_from(Rounding)),
                   operators=draw(st.sampled_from([{}, {"div": TableDivider}])),
                   guard_width=draw(st.sampled_from([None, 2, 3, 5])))
@@ -39,7 +40,7 @@ def datapaths(draw):
         def pick(nodes):
             return draw(st.sampled_from(nodes))
         kind = draw(st.sampled_from(["unary", "binary", "binary", "dot", "relation", "test", "logic", "not", "select",
-                                     "power", "within"]))
+                                     "register", "power", "within"]))
         if kind == "unary":
             floats.append(getattr(dp, pick(UNARY))(pick(floats)))
         elif kind == "binary":
@@ -60,6 +61,9 @@ def datapaths(draw):
         elif kind == "within":
             name = pick(["is_within", "is_at_most_one_plus"])
             flags.append(getattr(dp, name)(pick(floats), pick(powers)))
+        elif kind == "register":
+            nodes = pick([floats, flags])
+            nodes.append(dp.register(pick(nodes)))
         elif kind == "not":
             flags.append(dp.logical_not(pick(flags)))
         else:

@@ -63,6 +63,8 @@ def everything():
     output("or_", dp.logical_or(negative, below), lambda a, b: a < 0 or a < b)
     output("select", dp.select(negative, a, b), lambda a, b: a if a < 0 else b)
     output("select_flag", dp.select(negative, below, dp.sign(b)), lambda a, b: a < b if a < 0 else copysign(1, b) < 0)
+    output("register", dp.register(a), lambda a, b: a)
+    output("register_flag", dp.register(below), lambda a, b: a < b)
     output("const", dp.const(0.6), lambda a, b: 0.625)
     output("const_tie", dp.const(1.125), lambda a, b: 1.0)
     return dp, wanted
