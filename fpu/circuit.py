@@ -8,7 +8,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from .delay import Delay
-from .power import POWER_LOGIC
+from .power import POWER_LOGIC, POWER_OPERANDS
 
 __all__ = ["Circuit"]
 
@@ -122,6 +122,8 @@ class Circuit(wiring.Component):
             m.d.comb += signal.eq(self.datapath.fmt.const(node.payload))
         elif node.op in _LOGIC:
             cycles = 0 if node.arrival is None else node.arrival - node.start
+            if node.op in POWER_OPERANDS:
+                operands = POWER_OPERANDS[node.op](*operands)
             if cycles > 1:
                 operands = [self._delayed(m, f"{name}_operand_{number}", operand, cycles=cycles - 1)
                             for number, operand in enumerate(operands)]

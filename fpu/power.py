@@ -7,7 +7,8 @@ from amaranth.hdl import Cat, Const, Mux
 
 from .rounding import emulated
 
-__all__ = ["POWER_EMULATIONS", "POWER_LOGIC", "power", "power_div", "power_max", "power_mul", "raised"]
+__all__ = ["POWER_EMULATIONS", "POWER_LOGIC", "POWER_OPERANDS", "power", "power_div", "power_max", "power_mul",
+           "raised"]
 
 
 @emulated
@@ -83,18 +84,26 @@ def _at_most_one_plus(a, power):
     return a.sign | (a.exp < bias) | (a.exp == bias) & (~over | ~a.frac.any())
 
 
-def _raised(a, power):
+def _units(a, power):
+    """``power`` as units of ``a`` in the last place; none of 0."""
     fmt = a.shape()
     lowest = fmt.bias - fmt.frac_width
     units = Cat(power.exp == lowest + place if lowest + place > 0 else Const(0, 1) for place in range(fmt.frac_width))
+    return Mux(a.exp == 0, 0, units)
+
+
+def _raised(a, units):
+    fmt = a.shape()
     # A carry out of the fraction is the next binade.
-    moved = Cat(a.frac, a.exp) + Mux(a.exp == 0, 0, units)
+    moved = Cat(a.frac, a.exp) + units
     frac, exp = moved[:fmt.frac_width], moved[fmt.frac_width:][:fmt.exp_width]
     is_inf = a.exp.all() | exp.all()
     return Cat(frac & ~is_inf.replicate(fmt.frac_width), exp | is_inf.replicate(fmt.exp_width), a.sign)
 
 
-#: What an operation is in terms of its operands.
+#: What becomes of the operands before their registers, if there are any.
+POWER_OPERANDS = MappingProxyType({"raised": lambda a, power: (a, _units(a, power))})
+#: What an operation is in terms of its operands, or of what :data:`POWER_OPERANDS` makes of them.
 POWER_LOGIC = MappingProxyType({
     "power": lambda a: Cat(Const(0, a.shape().frac_width), a.exp),
     "power_max": lambda a, b: Cat(Const(0, a.shape().frac_width), Mux(a.exp >= b.exp, a.exp, b.exp)),
