@@ -16,6 +16,7 @@ from .pipeline import pipeline
 from .render import render
 from .simulated import simulated
 from .stability import stability
+from .units import units
 from .view import view
 
 __all__ = ["main"]
@@ -40,5 +41,6 @@ main.add_command(pipeline)
 main.add_command(render)
 main.add_command(simulated)
 main.add_command(stability)
+main.add_command(units)
 main.add_command(view)
 main.add_command(image)
