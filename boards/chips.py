@@ -10,6 +10,8 @@ __all__ = ["FULL", "SIMPLE", "SMALL"]
 FULL = ChipConfig(num_threads=32, shader=ShaderFeatures(depth=4))
 #: Colours and a cosine, the paper's format and caches, for an LFE5U-45F.
 SIMPLE = ChipConfig(num_threads=32)
-#: For an LFE5U-25F: as many threads and lines as its 56 block RAMs hold, in a format in which the room looks right.
-SMALL = ChipConfig(fmt=FloatFormat(6, 12), num_threads=8, stack_depth=16, edge_tolerance=0, mailbox_entries=0,
-                   node_lines=128, list_lines=64, matrix_lines=64, index_width=16, coord_width=10)
+#: For an LFE5U-25F: as many threads and lines as its 56 block RAMs hold, in a format in which the room looks right;
+#: with as few stages as its clock asks for, as flip-flops and what delays beside them would fill it.
+SMALL = ChipConfig(fmt=FloatFormat(6, 12), add_latency=3, mul_latency=2, div_latency=8, cmp_latency=1, num_threads=8,
+                   stack_depth=16, edge_tolerance=0, mailbox_entries=0, node_lines=128, list_lines=64, matrix_lines=64,
+                   index_width=16, coord_width=10)

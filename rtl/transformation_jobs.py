@@ -25,6 +25,8 @@ class Kind(enum.Enum, shape=2):
 class TransformationJobs(wiring.Component):
     """Takes jobs, those of the shader and new packets first, and says vector for vector what is to be transformed.
 
+    A vector a cycle; of jobs of one vector each, one in two.
+
     Parameters
     ----------
     fmt, num_threads, stack_depth, index_width, coord_width, tag, solid
@@ -96,7 +98,8 @@ class TransformationJobs(wiring.Component):
         m.d.comb += [
             boundary.eq(~active | last),
             moves.eq(boundary & has_following & ~(lately & following_stores)),
-            room.eq(~has_following | moves),
+            # Not one that is just free: 400 flip-flops would wait for that. Only jobs of one vector come slower so.
+            room.eq(~has_following),
         ]
         with m.If(boundary):
             m.d.sync += active.eq(0)
@@ -115,9 +118,11 @@ class TransformationJobs(wiring.Component):
 
         # Where there is room something is put, whether it is there or not: many a bit waits for who it is.
         if has_shader:
-            comes = self._take_step(m, following, room, Mux(has_following, following_stores, lately), take)
+            comes = self._take_step(m, following, room, lately, take)
         else:
             comes = self._take_primary(m, following, room, take)
+        with m.If(moves):
+            m.d.sync += has_following.eq(0)
         with m.If(room):
             m.d.sync += has_following.eq(comes)
 
