@@ -1,6 +1,9 @@
 """Queues and the merging of streams."""
 
-from amaranth.hdl import Assert, Module, Mux, Shape, Signal
+from functools import reduce
+from operator import or_
+
+from amaranth.hdl import Assert, Cat, Module, Mux, Shape, Signal, Value
 from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -165,22 +168,23 @@ class Merge(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        turn = Signal(range(self._num_inputs))
+        turn, chosen = Signal(range(self._num_inputs)), Signal(self._num_inputs)
+        valid = Cat(each.valid for each in self.i)
         with m.Switch(turn):
             for first in range(self._num_inputs):
                 with m.Case(first):
-                    # The last assignment wins, so the input whose turn it is comes last.
-                    for offset in reversed(range(self._num_inputs)):
-                        number = (first + offset) % self._num_inputs
-                        candidate = self.i[number]
-                        with m.If(candidate.valid):
-                            m.d.comb += [
-                                self.o.payload.eq(candidate.payload),
-                                self.o.valid.eq(1),
-                                [other.ready.eq(0) for other in self.i],
-                                candidate.ready.eq(self.o.ready),
-                            ]
-                            m.d.sync += turn.eq(Mux(self.o.ready, (number + 1) % self._num_inputs, number))
+                    for number in range(self._num_inputs):
+                        earlier = [valid[(first + offset) % self._num_inputs]
+                                   for offset in range((number - first) % self._num_inputs)]
+                        m.d.comb += chosen[number].eq(valid[number] & ~Cat(earlier).any())
+        for number, each in enumerate(self.i):
+            m.d.comb += each.ready.eq(chosen[number] & self.o.ready)
+            with m.If(chosen[number]):
+                m.d.sync += turn.eq(Mux(self.o.ready, (number + 1) % self._num_inputs, number))
+        # A bit of each of two inputs that may be chosen is a table, where a multiplexer by turns would be four.
+        payload = reduce(or_, (Value.cast(each.payload) & chosen[number].replicate(len(Value.cast(each.payload)))
+                               for number, each in enumerate(self.i)))
+        m.d.comb += [self.o.valid.eq(valid.any()), Value.cast(self.o.payload).eq(payload)]
         return m
 
 
