@@ -47,7 +47,8 @@ class ChipConfig:
         Which of :data:`~rtl.arithmetic.ARITHMETICS` it computes by.
     edge_tolerance : int
         By how much edges of triangles give, in units in the last place of what was added up: a power of two up to 64,
-        or 0 for none. Not with fused sums, whose products are not seen; so the default is 8, but none with these.
+        or 0 for none. One of two triangles at an edge may give by twice that, where the ray does not graze it. Not with
+        fused sums, whose products are not seen; so the default is 8, but none with these.
     num_pipelines : int
         Pipelines behind one ray generation controller, 1…4.
     shader : :class:`~rtl.program.features.ShaderFeatures`, optional

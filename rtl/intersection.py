@@ -1,13 +1,12 @@
 """Intersection of rays with the unit triangle, and the closest hit of each ray."""
 
-import math
-
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from fpu import Delay
 
+from . import soft_hits
 from .arithmetic import ARITHMETICS
 from .block_memory import BlockMemory
 from .layout import PACKET_RAYS, scale_layout, thread_width, token_layout, vector_layout, with_token
@@ -137,7 +136,7 @@ class Intersection(wiring.Component):
         # Of each ray, what the next hit has to be nearer than.
         best_layout = self._fmt
         if self._tolerance:
-            best_layout = data.StructLayout({"key": self._fmt, "front": self._fmt, "back": self._fmt})
+            best_layout = soft_hits.best_layout(self._fmt)
         m.submodules.to_ask = to_ask = Delay(beside_layout, cycles=ask_at)
         m.submodules.to_end = to_end = Delay(beside_layout, cycles=latency - ask_at, registered=True)
         valid = Signal(latency + 1)
@@ -154,16 +153,18 @@ class Intersection(wiring.Component):
         ]
         m.d.sync += valid[1:].eq(valid[:-1])
         m.submodules.distances = distances = BlockMemory(best_layout, depth=PACKET_RAYS * num_slots)
-        best = self._best(m, test, distances.data, to_ask.o) if self._tolerance else distances.data
+        best = distances.data
+        if self._tolerance:
+            best = soft_hits.stored_best(m, test, best, to_ask.o, fmt=self._fmt)
         m.d.comb += [
             distances.reading.eq(valid[ask_at]),
             distances.address.eq(Cat(to_ask.o.ray, to_ask.o.token.thread)),
             test.t_hit.eq(best.key if self._tolerance else best),
         ]
 
+        about_soft = {"key": self._fmt, "is_soft": 1, "is_loose": 1} if self._tolerance else {}
         found = Signal(data.StructLayout({"hit": 1, "nearer": 1, "t": self._fmt, "u": self._fmt, "v": self._fmt,
-                                          **({"key": self._fmt, "is_soft": 1} if self._tolerance else {})}),
-                       reset_less=True)
+                                          **about_soft}), reset_less=True)
         m.d.sync += [found[name].eq(getattr(test, name)) for name in found.shape().members]
         done = to_end.o
         before = Signal(PACKET_RAYS)
@@ -250,9 +251,9 @@ class Intersection(wiring.Component):
             ]
             m.d.sync += bank_distance.eq(bank_read.data)
         if self._tolerance:
-            self._keep_soft(m, best, new_best, record_write, found=found, done=done, better=better, kept=kept,
-                            taken=valid[-1] & allowed, is_over=is_over,
-                            cycles=latency - graph.inputs["t_hit"].start)
+            soft_hits.keep_soft(m, best, new_best, record_write, fmt=self._fmt, found=found, done=done, better=better,
+                                kept=kept, taken=valid[-1] & allowed, is_over=is_over,
+                                cycles=latency - graph.inputs["t_hit"].start)
         if self._limited:
             # So that the shader does not wait within a cycle for whether there is a hit.
             m.submodules.begins = queue = Queue(self.limit.payload.shape(), depth=2)
@@ -268,43 +269,13 @@ class Intersection(wiring.Component):
                     written.record.triangle.eq(~0),
                 ]
                 if self._tolerance:
-                    infinity = self._fmt.const(math.inf)
-                    m.d.comb += written.best.eq(Cat(begin.t_far, infinity, infinity))
+                    m.d.comb += soft_hits.begun(written.best, begin.t_far, fmt=self._fmt)
                 else:
                     m.d.comb += written.best.eq(begin.t_far)
             m.d.comb += begins.ready.eq(~has_kept)
             self._limit(m, test, begins, to_ask.o, to_end.o, asks=valid[ask_at], cycles=latency - ask_at,
                         instances=instances, allowed=allowed, is_over=is_over)
         return m
-
-    def _best(self, m, test, stored, asking):
-        """What is stored of the ray ``asking``, two cycles later; of one without a hit it is another's."""
-        best = Signal(stored.shape())
-        m.submodules.asked_hit = has_hit = Delay(1, cycles=2)
-        infinity = self._fmt.const(math.inf)
-        m.d.comb += [
-            has_hit.i.eq(asking.token.hit.bit_select(asking.ray, 1)),
-            *(best[name].eq(Mux(has_hit.o, stored[name], infinity)) for name in ("key", "front", "back")),
-            test.soft_front.eq(best.front),
-            test.soft_back.eq(best.back),
-        ]
-        return best
-
-    def _keep_soft(self, m, best, new_best, record_write, *, found, done, better, kept, taken, is_over, cycles):
-        """Keeps a soft hit for another to join it, beside the best one that there is, ``cycles`` after that is read."""
-        m.submodules.best_until = until = Delay(best.shape(), cycles=cycles)
-        before, is_soft = until.o, Signal()
-        m.d.comb += [
-            until.i.eq(best),
-            is_soft.eq(taken & found.is_soft),
-            kept.eq(better | is_soft),
-            new_best.key.eq(Mux(better, Mux(is_over, self._fmt.const(0.0), found.key), before.key)),
-            new_best.front.eq(Mux(is_soft & ~done.cosine.sign, found.t, before.front)),
-            new_best.back.eq(Mux(is_soft & done.cosine.sign, found.t, before.back)),
-        ]
-        with m.If(~better):
-            m.d.comb += [record_write.data.triangle.eq(~0),
-                         record_write.en.eq(is_soft & ~done.token.hit.bit_select(done.ray, 1))]
 
     def _scale(self, m, test, vector):
         """How much rounding may have changed origin and direction goes beside them."""

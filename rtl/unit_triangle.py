@@ -4,13 +4,15 @@ from fpu import Datapath, Vector
 
 from .arithmetic import ARITHMETICS
 
-__all__ = ["MARGIN", "MAX_MARGIN", "MAX_TOLERANCE", "REACH", "edge_errors", "edge_scales", "inside_edges",
-           "unit_triangle"]
+__all__ = ["GRAZING", "MARGIN", "MAX_MARGIN", "MAX_TOLERANCE", "REACH", "edge_errors", "edge_scales",
+           "inside_edges", "unit_triangle"]
 
 #: No edge gives by more, in u and v: seen so exactly from its edge that t is lost, a triangle would reach out.
 MAX_TOLERANCE = 2.0**-3
 #: Part of t within which two soft hits are at one edge: where a ray grazes, that is how far apart rounding puts them.
 REACH = 2.0**-6
+#: What t may have lost, s(D′z)/|D′z|, before a triangle counts as one that the ray grazes.
+GRAZING = 2.0
 #: Tolerances by which a hit that is inside by tolerance alone counts as farther than it is, times what t has lost.
 MARGIN = 1
 #: No soft hit counts as farther by a greater part of t.
@@ -29,15 +31,18 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
 
     in powers of two; s, the ``scale`` of :func:`~rtl.affine_map.affine_map`, is the largest of the products that were
     added up. What rounding them does to O′x is the first term; the second is what t does, which divides by D′z = D·N
-    and loses what that has lost, where a ray grazes. What is 0 or more is inside whatever ε is.
+    and loses what that has lost, where a ray grazes. What is 0 or more is inside whatever ε is. Where s(D′z)/|D′z| is
+    at most :data:`GRAZING`, twice the ``tolerance`` holds, and what is not inside without that is loose.
 
     A hit by tolerance alone is soft, others are firm. Where a ray slips between two triangles, it is soft on both;
     where it passes an outline, on one, or on two of which one is seen from behind. So a soft hit is a ``hit`` if it is
     within :data:`REACH` of the last soft one that was none, of a triangle seen from the same side (``soft_front``:
-    against its normal, ``soft_back``); else ``is_soft`` says that it is to be that one. And where triangles overlap by
-    their tolerance, the one that is hit firmly is the one that is there: what counts is not t but ``key``, t and of a
-    soft hit as much more as its t may be wrong, ``margin``·s(D′z)/|D′z| and at most :data:`MAX_MARGIN`, see
-    :meth:`~fpu.graph.Graph.raised`. ``nearer`` is key < t_hit then, the nearest so far; what is not is no ``is_soft``.
+    against its normal, ``soft_back``), and not both are loose (``front_is_loose``, ``back_is_loose``): rounding is
+    seldom far off twice. Else ``is_soft`` says that it is to be that one, ``is_loose`` how. And where triangles overlap
+    by their tolerance, the one that is hit firmly is the one that is there: what counts is not t but ``key``, t and of
+    a soft hit as much more as its t may be wrong, ``margin``·s(D′z)/|D′z|, twice that where twice the tolerance holds,
+    and at most :data:`MAX_MARGIN`, see :meth:`~fpu.graph.Graph.raised`. ``nearer`` is key < t_hit then, the nearest so
+    far; what is not is no ``is_soft``.
 
     Datapath: 3 adders, 2 multipliers, 1 divider, 1 comparator; with ``near`` another comparator; if tolerant, two more,
     a few additions and comparisons of exponents, and additions of a constant to bits.
@@ -52,17 +57,26 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
         scales = edge_scales(dp)
         loss = dp.power_div(scales["direction_scale"].z, dp.power(direction.z))
         errors = edge_errors(dp, t, direction, **scales)
-        # A constant that needs no registers
+        grazes = dp.logical_not(dp.is_within(loss, dp.const(2 * GRAZING)))
+        # Constants that need no registers
         tolerance = dp.input("tolerance", delay=max(map(dp.arrival, errors)))
-        inside = inside_edges(dp, u, v, [dp.power_mul(error, tolerance) for error in errors])
-        margin = dp.power_mul(loss, dp.input("margin", delay=dp.arrival(t)))
+        inside, close = (
+            inside_edges(dp, u, v, [dp.power_mul(error, units) for error in errors])
+            for units in (_twice_unless(dp, grazes, tolerance), tolerance))
+        is_loose = dp.logical_not(close)
+        margin = dp.power_mul(loss, _twice_unless(dp, grazes, dp.input("margin", delay=dp.arrival(t))))
         most = dp.const(MAX_MARGIN)
         firm, later = _is_inside(dp, u, v), dp.raised(t, dp.select(dp.is_within(margin, most), margin, most))
         key = dp.register(dp.select(firm, t, later))
         reach = dp.const(REACH)
         front, back = (dp.input(name, delay=dp.arrival(key)) for name in ("soft_front", "soft_back"))
-        t_soft = dp.select(dp.sign(direction.z), back, front)
-        is_pair = dp.logical_and(dp.le(t_soft, dp.raised(t, reach)), dp.le(t, dp.raised(t_soft, reach)))
+        is_back = dp.sign(direction.z)
+        t_soft = dp.select(is_back, back, front)
+        front_is_loose, back_is_loose = (
+            dp.flag(name, delay=dp.arrival(key)) for name in ("front_is_loose", "back_is_loose"))
+        both = dp.logical_and(is_loose, dp.select(is_back, back_is_loose, front_is_loose))
+        is_pair = dp.logical_and(dp.le(t_soft, dp.raised(t, reach)), dp.le(t, dp.raised(t_soft, reach)),
+                                 dp.logical_not(both))
         soft = dp.logical_and(inside, dp.logical_not(firm), dp.logical_not(is_pair))
         inside = dp.logical_and(inside, dp.logical_or(firm, is_pair))
     else:
@@ -81,7 +95,12 @@ def unit_triangle(fmt, *, latencies=None, arithmetic=ARITHMETICS[0], near=False,
     if tolerant:
         dp.output("key", key)
         dp.output("is_soft", dp.logical_and(ahead, soft, nearer))
+        dp.output("is_loose", is_loose)
     return dp
+
+
+def _twice_unless(dp, flag, power):
+    return dp.select(flag, power, dp.power_mul(power, dp.const(2.0)))
 
 
 def _is_inside(dp, u, v):

@@ -124,7 +124,8 @@ def _joined(fmt, ray, tested, reach):
     one, other = order[:-1], order[1:]
     bits = fmt.encode(tested.t[order])
     joined[other] = ((ray[one] == ray[other]) & (tested.is_back[one] == tested.is_back[other])
-                     & (bits[1:] - bits[:-1] <= reach * 2**fmt.frac_width))
+                     & (bits[1:] - bits[:-1] <= reach * 2**fmt.frac_width)
+                     & ~(tested.is_loose[one] & tested.is_loose[other]))
     return joined
 
 

@@ -11,7 +11,7 @@ from .parts import named
 __all__ = ["Method", "Tested", "built"]
 
 #: Results of a test, of which not all have the last three: else the key is t, and nothing soft.
-Tested = namedtuple("Tested", ["t", "u", "v", "hit", "key", "is_soft", "is_back"])
+Tested = namedtuple("Tested", ["t", "u", "v", "hit", "key", "is_soft", "is_back", "is_loose"])
 
 
 @lru_cache(maxsize=64)
@@ -97,7 +97,8 @@ class Method:
         results = test.model(**{name: given[name] for name in test.input_names})
         nothing = np.zeros(np.shape(results["hit"]), np.bool_)
         return Tested(*(results[name] for name in ("t", "u", "v", "hit")), results.get("key", results["t"]),
-                      results.get("is_soft", nothing), np.signbit(given["direction_z"]) if self.reach else nothing)
+                      results.get("is_soft", nothing), np.signbit(given["direction_z"]) if self.reach else nothing,
+                      results.get("is_loose", nothing))
 
     def cost(self, fmt):
         """Operators for a test a clock, as :meth:`~fpu.Datapath.cost`; those that a ray takes once are apart."""

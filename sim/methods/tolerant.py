@@ -88,7 +88,9 @@ def tolerant(ulp, *, bound=None, cap=MAX_TOLERANCE, name=None):
     if bound is None:
         def constants(fmt):
             unit = 2.0**-fmt.frac_width
-            return {"tolerance": ulp * unit, "margin": MARGIN * ulp * unit, "soft_front": np.inf, "soft_back": np.inf}
+            return {"tolerance": ulp * unit, "margin": MARGIN * ulp * unit,
+                    **dict.fromkeys(("soft_front", "soft_back"), np.inf),
+                    **dict.fromkeys(("front_is_loose", "back_is_loose"), False)}
 
         return Method(name or f"tolerant {ulp}", stored_matrix, _chip_test, point_map=scaled_map, needs_area=True,
                       reach=REACH, constants=constants)

@@ -98,6 +98,7 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
 
     # Of each ray what the next hit has to be nearer than, and the soft hits on fronts and backs that wait for another.
     nearest, waiting = np.full(4, np.inf), np.full((4, 2), np.inf)
+    waiting_is_loose = np.zeros((4, 2), np.bool_)
     has_distance = 0
     for ray in range(4):
         owners[ray, 0] = owners[ray, 1] = -1
@@ -232,19 +233,21 @@ def trace_packet(arithmetic, params, root, nodes, splits, lists, matrices, mailb
                     scale = mapped_scale[first]
                     dx, dy, dz, scale_x, scale_y, scale_z = _transform_scaled(
                         arithmetic, params, matrix, direction[level, ray], False)
-                    t, u, v, hit, nearer, key, is_soft = tolerant_triangle(
+                    t, u, v, hit, nearer, key, is_soft, is_loose = tolerant_triangle(
                         arithmetic, params, here[0], here[1], here[2], dx, dy, dz, scale[0], scale[1], scale[2],
                         scale_x, scale_y, scale_z, tolerance, MARGIN * tolerance, waiting[ray, 0],
-                        waiting[ray, 1], nearest[ray], limits[ray, 0])
+                        waiting[ray, 1], waiting_is_loose[ray, 0], waiting_is_loose[ray, 1], nearest[ray],
+                        limits[ray, 0])
                 else:
                     dx, dy, dz = transform(arithmetic, params, matrix, direction[level, ray], False)
                     t, u, v, hit, nearer = unit_triangle(arithmetic, params, here[0], here[1], here[2], dx, dy, dz,
                                                          nearest[ray], limits[ray, 0])
-                    key, is_soft = t, False
+                    key, is_soft, is_loose = t, False, False
                 if index == excluded[ray, 0] and owner == excluded[ray, 1]:
                     continue
                 if is_soft:
-                    waiting[ray, 1 if math.copysign(1.0, dz) < 0 else 0] = t
+                    side = 1 if math.copysign(1.0, dz) < 0 else 0
+                    waiting[ray, side], waiting_is_loose[ray, side] = t, is_loose
                     has_distance |= 1 << ray
                 if hit and (nearer or not has_distance >> ray & 1):
                     hits[ray, 0], hits[ray, 1], hits[ray, 2], hits[ray, 3] = t, u, v, dz

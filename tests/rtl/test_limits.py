@@ -9,7 +9,7 @@ import pytest
 from fpu import FloatFormat
 from rtl.intersection import Intersection
 from rtl.layout import PACKET_RAYS
-from rtl.unit_triangle import MARGIN, MAX_MARGIN, MAX_TOLERANCE, REACH
+from rtl.unit_triangle import GRAZING, MARGIN, MAX_MARGIN, MAX_TOLERANCE, REACH
 from tests.bench import drain, feed, simulate
 from tests.rtl.packets import fields, random_token, rays_of
 from tests.rtl.rounded import Rounded, same
@@ -39,7 +39,8 @@ class World:
         self.limits, self.vectors, self.entered = deque(), deque(), deque()
         # Of each thread: limits by ray, records by ray, tests that are still to come, and its instance.
         self.rays, self.records = {}, {thread: {} for thread in range(num_threads)}
-        # Of each thread, t of the soft hits that wait for another, by ray and whether from behind.
+        # Of each thread, t of the soft hits that wait for another and whether they are loose, by ray and whether from
+        # behind.
         self.soft = {}
         self.left = dict.fromkeys(range(num_threads), 0)
         self.instances, self.expected = {}, {}
@@ -76,16 +77,16 @@ class World:
         origin = scale = None
         for ray in numbers:
             if origin is None or own:
-                scales = [rng.choice([0, FMT.bias - 1, FMT.bias, FMT.bias + 1]) for _ in range(3)]
+                scales = [rng.choice([0, FMT.bias - 1, FMT.bias, FMT.bias, FMT.bias + 1]) for _ in range(3)]
                 scale = {"scale": scales} if self.tolerance else {}
                 origin = [rng.randrange(-4, 9) / 4 for _ in range(2)] + [rng.choice([-1, 1]) * rng.randrange(1, 16) / 4]
                 self.vectors.append(packet | {"is_origin": 1, "ray": ray, "first": int(ray == numbers[0]), "last": 0,
                                               **scale, "vector": dict(zip("xyz", origin, strict=True))})
             target = rng.randrange(4) / 4, rng.randrange(3) / 4, 0.0
-            if self.tolerance and rng.random() < 0.7:
-                target = rng.choice([0.25, 0.5]), rng.choice([-1, -4, -12, -100]) / 256, 0.0
+            if self.tolerance and rng.random() < 0.85:
+                target = rng.choice([0.25, 0.5]), rng.choice([-1, -4, -6, -6, -6, -12, -100]) / 256, 0.0
             # t is how often this fits in, often one of the limits.
-            times = rng.choice([1.0, 1.0, 2.0, 4 / 3, 0.5, 0.25, -1.0])
+            times = rng.choice([1.0, 1.0, 2.0, 4 / 3, 0.5, 0.25, -1.0, *[1.0] * (6 if self.tolerance else 0)])
             direction = [self.arithmetic.round(times * (end - begin))
                          for end, begin in zip(target, origin, strict=True)]
             loss = rng.choice([0.0, 0.5, 1.0, 4.0])
@@ -102,20 +103,29 @@ class World:
         """So many units in the last place farther."""
         return float(FMT.decode(FMT.encode(t) + units)) if 0 < t < math.inf else t
 
-    def join(self, thread, ray, t, key, direction):
+    @staticmethod
+    def is_inside(u, v, total, edges):
+        """Whether no edge is crossed by more than it gives."""
+        return all(x >= 0 or -x < edge for x, edge in zip((u, v), edges, strict=True)) and (
+            total <= 1 or total < 1 + max(edges))
+
+    def join(self, thread, ray, t, key, direction, is_loose):
         """Whether a soft hit finds one that waits for it; else it may wait itself."""
         is_back, reach = math.copysign(1, direction[2]) < 0, int(REACH * 2**FMT.frac_width)
-        waiting = self.soft[thread].get((ray, is_back), math.inf)
+        waiting, other_is_loose = self.soft[thread].get((ray, is_back), (math.inf, False))
         if waiting <= self.raised(t, reach) and t <= self.raised(waiting, reach):
-            self.events["joined"] += 1
-            return True
+            if not (is_loose and other_is_loose):
+                self.events["joined"] += 1
+                self.events["one of two joined is loose"] += is_loose or other_is_loose
+                return True
+            self.events["both loose"] += 1
         if not key < self.records[thread].get(ray, {}).get("key", math.inf):
             self.events["alone and too far"] += 1
             return False
         self.events["waits"] += 1
         self.events["waits behind"] += waiting < t
         self.events["of another side"] += (ray, not is_back) in self.soft[thread]
-        self.soft[thread][ray, is_back] = t
+        self.soft[thread][ray, is_back] = t, is_loose
         if ray not in self.records[thread]:
             self.records[thread][ray] = {"key": math.inf, "triangle": NONE}
         return False
@@ -126,12 +136,12 @@ class World:
         kept, total = records.get(ray, {}).get("key", math.inf), self.arithmetic.add(u, v)
         errors = [max(2.0 ** (scale - FMT.bias) if scale else 0.0, power(self.arithmetic.mul(t, way)) * loss)
                   for scale, way in zip(scales, direction[:2], strict=False)]
-        edges = [min(self.tolerance * error * 2.0**-FMT.frac_width, MAX_TOLERANCE) for error in errors]
         is_firm = u >= 0 and v >= 0 and total <= 1
-        is_soft = not is_firm and self.tolerance and all(
-            x >= 0 or -x < edge for x, edge in zip((u, v), edges, strict=True)) and (
-            total <= 1 or total < 1 + max(edges))
-        later = int(min(MARGIN * self.tolerance * loss, MAX_MARGIN * 2**FMT.frac_width))
+        times = 1 if loss > GRAZING else 2
+        is_soft, is_close = (not is_firm and self.tolerance and self.is_inside(
+            u, v, total, [min(units * error * 2.0**-FMT.frac_width, MAX_TOLERANCE) for error in errors])
+            for units in (times * self.tolerance, self.tolerance))
+        later = int(min(times * MARGIN * self.tolerance * loss, MAX_MARGIN * 2**FMT.frac_width))
         key = self.raised(t, later) if is_soft else t
         if not ((is_firm or is_soft) and t < math.inf):
             events["beside"] += 1
@@ -140,7 +150,7 @@ class World:
             events["just too near"] += t == limits["t_near"] > 0
         elif (index, instance) == (limits["triangle"], limits["instance"]):
             events["excluded inside of an instance" if level else "excluded"] += 1
-        elif is_soft and not self.join(thread, ray, t, key, direction):
+        elif is_soft and not self.join(thread, ray, t, key, direction, not is_close):
             pass
         elif not key < kept:
             events["over" if kept == 0 else "as far" if key == kept else "too far"] += 1
@@ -225,7 +235,7 @@ def test_limits(seed, num_threads, gap, near, tolerance):
     assert num_records[0] > 200
     if tolerance:
         assert min(events[event] for event in ("of another side", "joined", "alone and too far", "waits",
-                                              "waits behind")) > 0
+                                              "waits behind", "one of two joined is loose", "both loose")) > 0
 
 
 def log_accepted(dut, accepted):

@@ -8,7 +8,7 @@ import pytest
 from fpu import FloatFormat
 from rtl.affine_map import affine_map
 from rtl.arithmetic import ARITHMETICS
-from rtl.unit_triangle import MARGIN, MAX_MARGIN, MAX_TOLERANCE, REACH, unit_triangle
+from rtl.unit_triangle import GRAZING, MARGIN, MAX_MARGIN, MAX_TOLERANCE, REACH, unit_triangle
 
 FMT = FloatFormat(7, 16)
 COUNT = 3000
@@ -23,6 +23,11 @@ def raised(t, units):
     """So many units in the last place farther from 0."""
     bits = FMT.encode(abs(t)) + (units if 0 < abs(t) < np.inf else 0)
     return math.copysign(FMT.decode(np.minimum(bits, FMT.exp_inf << FMT.frac_width)), t)
+
+
+def is_inside(u, v, total, limits):
+    return all(x >= 0 or abs(x) < limit for x, limit in zip((u, v), limits, strict=True)) and (
+        total <= 1 or total < 1 + max(limits))
 
 
 def random(rng, shape, spread=6):
@@ -58,7 +63,7 @@ def test_edges_give_by_what_was_lost(ulp):
     origin, direction = random(rng, (COUNT, 3), 2), random(rng, (COUNT, 3), 2)
     # Points close to an edge, or to the one across.
     t = -origin[:, 2] / direction[:, 2]
-    place = rng.choice([0.0, 1e-5, -1e-5, -3e-4, -2e-2, 0.5, 1.0, 1.00002, 1.01], (COUNT, 2))
+    place = rng.choice([0.0, 1e-5, -1e-5, -3e-4, -2e-2, 0.5, 1.0, 1.00002, 1.01, -1.5 * ulp * 2.0**-16], (COUNT, 2))
     origin[:, :2] = FMT.quantize(place - t[:, None] * direction[:, :2])
     scales = {name: np.array([[power(x) for x in vector] for vector in values]) * 2.0 ** rng.integers(0, 6, (COUNT, 3))
               for name, values in (("origin", origin), ("direction", direction))}
@@ -75,27 +80,38 @@ def test_edges_give_by_what_was_lost(ulp):
     for name in ("soft_front", "soft_back"):
         t_soft = FMT.quantize(np.abs(t) * (1 + rng.choice([-1.5, -0.9, 0, 0.9, 1.5], COUNT) * REACH))
         tolerant[name] = np.where(rng.random(COUNT) < 0.3, np.inf, t_soft)
+    for name in ("front_is_loose", "back_is_loose"):
+        tolerant[name] = rng.random(COUNT) < 0.5
     plain, found = unit_triangle(FMT).model(**inputs), unit_triangle(FMT, tolerant=True).model(**tolerant)
     hits = beaten = waits = waits_behind = capped = 0
+    loose_pairs = loose_apart = 0
     for i in range(COUNT):
         u, v, t = (float(plain[name][i]) for name in ("u", "v", "t"))
         assert (u, v, t) == tuple(float(found[name][i]) for name in ("u", "v", "t"))
         loss = scales["direction"][i, 2] / power(direction[i, 2])
-        limits = [min(tolerance * max(scales["origin"][i, k], power(FMT.quantize(t * direction[i, k])) * loss),
-                      MAX_TOLERANCE) for k in (0, 1)]
-        inside = all(x >= 0 or abs(x) < limit for x, limit in zip((u, v), limits, strict=True))
-        total = float(FMT.quantize(u + v))
-        inside &= total <= 1 or total < 1 + max(limits)
+        lost = [max(scales["origin"][i, k], power(FMT.quantize(t * direction[i, k])) * loss) for k in (0, 1)]
+        total, times = float(FMT.quantize(u + v)), 1 if loss > GRAZING else 2
+        inside, close = (is_inside(u, v, total, [min(units * part, MAX_TOLERANCE) for part in lost])
+                         for units in (times * tolerance, tolerance))
+        is_loose = not close
         is_firm, ahead = u >= 0 and v >= 0 and total <= 1, 0 < t < np.inf
-        waiting = float(tolerant["soft_back" if math.copysign(1, direction[i, 2]) < 0 else "soft_front"][i])
-        later, reach = raised(t, int(min(MARGIN * ulp * loss, MAX_MARGIN * 2**16))), int(REACH * 2**16)
+        side = "back" if math.copysign(1, direction[i, 2]) < 0 else "front"
+        waiting, other_is_loose = float(tolerant[f"soft_{side}"][i]), bool(tolerant[f"{side}_is_loose"][i])
+        units = times * MARGIN * ulp * loss
+        later, reach = raised(t, int(min(units, MAX_MARGIN * 2**16))), int(REACH * 2**16)
         pairs = waiting <= raised(t, reach) and t <= raised(waiting, reach)
+        if inside and ahead and not is_firm and is_loose:
+            assert found["is_loose"][i]
+            loose_pairs += pairs and not other_is_loose
+            loose_apart += pairs and other_is_loose
+        pairs &= not (is_loose and other_is_loose)
         assert bool(found["hit"][i]) == (inside and ahead and (is_firm or pairs))
         is_nearer = (t if is_firm else later) < tolerant["t_hit"][i]
         assert bool(found["is_soft"][i]) == (inside and ahead and not is_firm and not pairs and is_nearer)
+        assert not found["is_soft"][i] or bool(found["is_loose"][i]) == is_loose
         waits += bool(found["is_soft"][i])
         waits_behind += bool(found["is_soft"][i]) and waiting < t
-        capped += not is_firm and MARGIN * ulp * loss > MAX_MARGIN * 2**16
+        capped += not is_firm and units > MAX_MARGIN * 2**16
         hits += bool(found["hit"][i]) and not plain["hit"][i]
         # A hit by tolerance alone has to be nearer by the margin.
         key = t if is_firm else later
@@ -109,3 +125,4 @@ def test_edges_give_by_what_was_lost(ulp):
     assert waits > COUNT / 200
     assert waits_behind > 0
     assert (capped > 0) == (ulp == 64)
+    assert min(loose_pairs, loose_apart) > 0

@@ -71,11 +71,12 @@ def test_bad_tolerances(ulp, options, message):
         tolerant(ulp, **options)
 
 
-@pytest.mark.parametrize(("method", "reach"), [
-    (METHODS["firm edges"], 1), (METHODS["default"], 8), (tolerant(2), 2), (tolerant(8, bound="full"), 8),
-    (tolerant(8, bound="products"), 8), (tolerant(8, bound="terms"), 8), (tolerant(2.0**14), 2**13),
-    (tolerant(2.0**14, bound="terms", cap=2.0**-10), 2**6)])
-def test_tolerance_widens_by_what_it_says(method, reach):
+@pytest.mark.parametrize(("method", "close", "reach"), [
+    (METHODS["firm edges"], 1, 1), (METHODS["default"], 8, 16), (tolerant(2), 2, 4),
+    (tolerant(8, bound="full"), None, 8), (tolerant(8, bound="products"), None, 8),
+    (tolerant(8, bound="terms"), None, 8), (tolerant(2.0**14), 2**13, 2**13),
+    (tolerant(2.0**14, bound="terms", cap=2.0**-10), None, 2**6)])
+def test_tolerance_widens_by_what_it_says(method, close, reach):
     """Rays that meet the plane a few units in the last place beyond an edge; all terms are 1 there, but for the cap."""
     corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, 1, 0)]])
     off = np.array([0, 1, 2, 3, 7, 8, 9, 15, 16, 63, 64, 1023, 1024, 5000, 8191, 8192])
@@ -87,6 +88,8 @@ def test_tolerance_widens_by_what_it_says(method, reach):
         rays = method.begin(FMT, origins, np.tile((1.0, 0, -1), (len(off), 1)))
         found = method.test(FMT, {key: value[[0] * len(off)] for key, value in stored.items()}, rays)
         assert (found.hit | found.is_soft).tolist() == (off < reach).tolist()
+        if found.is_soft.any():
+            assert (found.is_soft & ~found.is_loose).tolist() == ((0 < off) & (off < close)).tolist()
 
 
 def exact_hit(corners, origin, direction):
