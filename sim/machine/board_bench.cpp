@@ -69,7 +69,7 @@ struct Bench {
         : cable{divisor}, sync_period(sync_period), shift_period(shift_period), sheet(sdram::datasheets[sheet]) {
         chip = std::make_unique<Vcomponent>(&context);
         chip->rx = 1;
-        memory.emplace(sheet, double(sync_period) / 1000);
+        memory.emplace(this->sheet, double(sync_period) / 1000);
         reset(4);
     }
 
