@@ -15,7 +15,7 @@ from .harness import between_registers
 __all__ = ["Units"]
 
 _MODULE = re.compile(r"^(?:attribute [^\n]*\n)*module \\(?P<path>\S+)\n.*?^end$", re.MULTILINE | re.DOTALL)
-_PORT = re.compile(r"^  wire width (?P<width>\d+) (?:signed )?(?P<flow>input|output) \d+(?: signed)? +\\(?P<name>\S+)$",
+_PORT = re.compile(r"^  wire width (?P<width>\d+) (?P<flow>input|output) \d+ +(?:signed )?\\(?P<name>\S+)$",
                    re.MULTILINE)
 _FLOWS = {"input": In, "output": Out}
 _CLOCKING = {"clk": ClockSignal, "rst": ResetSignal}

@@ -6,19 +6,18 @@ from dataclasses import asdict
 import click
 from rich.console import Console
 
-from boards.chips import FULL
-from boards.design import synthesise
-from boards.device import DEVICES
+from boards.catalog import BOARDS
+from boards.chip import DEVICE
 from boards.ecp5 import critical_path, place
 from boards.packing import pack
 from boards.toolchain import versions
 from boards.unit import Units
 from rtl.dynrtc import DynRTC
 
-from .board_options import chip_option
+from .board_options import board_chip, chip_option
 from .engines import progress_on
 from .errors import BadInput, clear_errors
-from .options import chip_config, docs_option
+from .options import docs_option
 from .page import check_places, filled_page, markdown_table
 from .results import code_version, earlier_results, json_text, write_texts
 
@@ -69,7 +68,7 @@ def units(names, parameters, seeds, docs):
     The slowest of them bounds the chip's clock from above. What has been measured with the same code is kept.
     """
     console = Console(stderr=True, highlight=False)
-    config = chip_config(None, parameters) if parameters else FULL
+    config = board_chip(BOARDS["ulx3s_85f"], parameters)
     page, path = docs / "board.md", docs / "results" / "units.json"
     with clear_errors():
         check_places(page, _PARTS)
@@ -85,11 +84,9 @@ def units(names, parameters, seeds, docs):
         with progress_on(console, "units") as progress:
             for name in chosen:
                 progress(name)
-                design = built.design(known[name], device=DEVICES["LFE5U-85F"])
-                synthesise(design)
-                rows[name] = {**_row(name, design, seeds), "version": version}
+                rows[name] = {**_row(name, built.design(known[name]), seeds), "version": version}
                 console.print(f"{name}: {rows[name]['mhz']} MHz, {rows[name]['path']}", markup=False, soft_wrap=True)
-                results = {"device": "LFE5U-85F", "grade": _GRADE, "config": repr(config), "tools": versions(),
+                results = {"device": DEVICE.name, "grade": _GRADE, "config": repr(config), "tools": versions(),
                            "rows": sorted(rows.values(), key=lambda row: row["mhz"])}
                 # Kept after each: all take half an hour.
                 write_texts({path: json_text(results), page: filled_page(page, _PARTS, results)})

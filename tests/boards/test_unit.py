@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from amaranth.hdl import Module
+from amaranth.hdl import Module, signed
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -57,6 +57,34 @@ def test_a_unit_is_what_it_is_alone(path, depth):
 def test_all_units_have_paths():
     assert Units(Pair()).paths[:2] == ["chip", "chip.first"]
     assert "chip.second" in Units(Pair()).paths
+
+
+class Doubler(wiring.Component):
+    """2·i of a signed number."""
+
+    def __init__(self):
+        super().__init__({"i": In(signed(6)), "o": Out(signed(7))})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.shift = shift = Shift()
+        m.d.comb += [shift.i.eq(self.i), self.o.eq(shift.o)]
+        return m
+
+
+class Shift(wiring.Component):
+    def __init__(self):
+        super().__init__({"i": In(signed(6)), "o": Out(signed(7))})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.sync += self.o.eq(self.i << 1)
+        return m
+
+
+def test_signed_ports_are_ports():
+    # A bit for each of the six that a register takes, and the harness before and behind.
+    assert pack(Units(Doubler()).design("chip.shift")).ff == 6
 
 
 def test_no_such_unit():
