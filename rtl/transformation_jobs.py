@@ -25,7 +25,7 @@ class Kind(enum.Enum, shape=2):
 class TransformationJobs(wiring.Component):
     """Takes jobs, those of the shader and new packets first, and says vector for vector what is to be transformed.
 
-    A vector a cycle; of jobs of one vector each, one in two.
+    A vector a cycle, but for one that is to be stored after another: a pause comes first.
 
     Parameters
     ----------
@@ -85,8 +85,9 @@ class TransformationJobs(wiring.Component):
         ray, others = lowest_ray(m, remaining)
         stores, following_stores, has_origin = (Signal(name=name, reset_less=True)
                                                 for name in ("stores", "following_stores", "has_origin"))
-        last = Signal(reset_less=True)
-        boundary, moves, room, lately = Signal(), Signal(), Signal(), Signal()
+        last, last_next = Signal(reset_less=True), Signal()
+        boundary, moves, lately = Signal(), Signal(), Signal()
+        room, comes, coming_stores = Signal(init=1), Signal(), Signal()
         # Between the vectors of two packets for the ray store goes a pause: it takes three cycles for one of the same
         # origin or ray. A step may be of the same ray as the one before.
         if has_shader:
@@ -98,33 +99,44 @@ class TransformationJobs(wiring.Component):
         m.d.comb += [
             boundary.eq(~active | last),
             moves.eq(boundary & has_following & ~(lately & following_stores)),
-            # Not one that is just free: 400 flip-flops would wait for that. Only jobs of one vector come slower so.
-            room.eq(~has_following),
         ]
         with m.If(boundary):
             m.d.sync += active.eq(0)
         # An origin is never the last vector, as a mask is never empty.
         with m.If(origin_next):
-            m.d.sync += [origin_next.eq(0), last.eq(~others.any())]
+            m.d.sync += origin_next.eq(0)
+            m.d.comb += last_next.eq(~others.any())
         with m.Else():
-            m.d.sync += [remaining.eq(others), origin_next.eq(~shared), first.eq(0),
-                         last.eq(shared & others.any() & ~(others & (others - 1)).any())]
+            m.d.sync += [remaining.eq(others), origin_next.eq(~shared), first.eq(0)]
+            m.d.comb += last_next.eq(shared & others.any() & ~(others & (others - 1)).any())
         with m.If(moves):
             m.d.sync += [current.eq(following), stores.eq(following_stores), active.eq(1), remaining.eq(mask),
-                         origin_next.eq(has_origin), last.eq(~has_origin), first.eq(1)]
+                         origin_next.eq(has_origin), first.eq(1)]
+            m.d.comb += last_next.eq(~has_origin)
+        m.d.sync += last.eq(last_next)
 
         def take(kind, rays, *, to_store, origin=1):
-            m.d.sync += [following.kind.eq(kind), mask.eq(rays), has_origin.eq(origin), following_stores.eq(to_store)]
+            m.d.sync += [following.kind.eq(kind), mask.eq(rays), has_origin.eq(origin)]
+            m.d.comb += coming_stores.eq(to_store)
 
         # Where there is room something is put, whether it is there or not: many a bit waits for who it is.
         if has_shader:
-            comes = self._take_step(m, following, room, lately, take)
+            m.d.comb += comes.eq(self._take_step(m, following, room, stored, take))
         else:
-            comes = self._take_primary(m, following, room, take)
-        with m.If(moves):
-            m.d.sync += has_following.eq(0)
-        with m.If(room):
-            m.d.sync += has_following.eq(comes)
+            m.d.comb += comes.eq(self._take_primary(m, following, room, take))
+        # Said a cycle before, as 400 flip-flops wait for it: nothing is to follow then, or it moves for sure.
+        has_following_next, following_stores_next, boundary_next = (
+            Signal(name=name) for name in ("has_following_next", "following_stores_next", "boundary_next"))
+        m.d.comb += [
+            has_following_next.eq(Mux(room, comes, has_following & ~moves)),
+            following_stores_next.eq(Mux(room, coming_stores, following_stores)),
+            boundary_next.eq(boundary & ~moves | last_next),
+        ]
+        m.d.sync += [
+            has_following.eq(has_following_next),
+            following_stores.eq(following_stores_next),
+            room.eq(~has_following_next | boundary_next & ~following_stores_next),
+        ]
 
         token, about = current.job.token, self.vector.about
         m.d.comb += [
@@ -165,8 +177,8 @@ class TransformationJobs(wiring.Component):
                 ]
         return self.primary.valid | self.matrix.valid
 
-    def _take_step(self, m, following, room, after_store, take):
-        """Takes a vector of the shader before a packet to transform, unless that vector would have to wait.
+    def _take_step(self, m, following, room, stored, take):
+        """Takes a vector of the shader before a packet to transform, unless both would go to the ray store.
 
         Returns whether there is any.
         """
@@ -176,7 +188,8 @@ class TransformationJobs(wiring.Component):
         stores, is_step = Signal(), Signal()
         m.d.comb += [
             stores.eq(step.store != Store.NOWHERE),
-            is_step.eq(self.step.valid & ~(stores & after_store & self.matrix.valid)),
+            # Late by a cycle, as 400 flip-flops wait for it; who comes first is a matter of speed alone.
+            is_step.eq(self.step.valid & ~(stores & stored & self.matrix.valid)),
             self.step.ready.eq(room & is_step),
             self.matrix.ready.eq(room & ~is_step),
             write.addr.eq(self.shared.thread),
