@@ -207,8 +207,10 @@ class Intersection(wiring.Component):
         ]
         written = Signal(found_write)
         is_written, record_is_written = Signal(), Signal()
-        m.d.comb += [written.eq(kept_hit), is_written.eq(has_kept), record_is_written.eq(record_is_kept)]
         m.d.comb += [
+            written.eq(kept_hit),
+            is_written.eq(has_kept),
+            record_is_written.eq(record_is_kept),
             entered_write.addr.eq(self.entered.thread),
             entered_write.data.eq(self.entered.index),
             entered_write.en.eq(self.entered.valid),

@@ -8,13 +8,12 @@ from ..queue import Queue
 from .frame_receiver import MAX_PAYLOAD, FrameReceiver
 from .frame_sender import FrameSender, sent_layout
 from .protocol import ACKNOWLEDGED, MAX_WORDS, REFUSED, VERSION, Command, LinkCount, Reason
+from .register_file import RegisterFile
 
 __all__ = ["HostPort", "host_members"]
 
 #: More than from a frame's words to whether it is refused
 _CHECK_CYCLES = 4
-#: Of the numbers of what can be read, those chosen among first
-_GROUP_BITS = 4
 
 
 def host_members(*, word_width, num_registers, num_values):
@@ -97,12 +96,10 @@ class HostPort(wiring.Component):
         wiring.connect(m, answers.o, sender.i)
 
         counts = Signal(data.ArrayLayout(32, len(LinkCount)))
-        registers = Signal(self.registers.shape())
-        # What enables so many flip-flops comes from one.
-        setting = Signal(len(registers))
-        m.d.sync += setting.eq(0)
-        readable = [*registers, *counts, *self.values]
-        m.d.comb += self.registers.eq(registers)
+        num_registers = self.registers.shape().length
+        m.submodules.file = file = RegisterFile(num_registers=num_registers,
+                                                num_values=self._num_readable - num_registers)
+        m.d.comb += [self.registers.eq(file.registers), Cat(*file.values).eq(Cat(*counts, *self.values))]
         with m.If(receiver.missed):
             m.d.sync += counts[LinkCount.MISSED].eq(counts[LinkCount.MISSED] + 1)
 
@@ -115,14 +112,8 @@ class HostPort(wiring.Component):
         place, left = Signal(range(MAX_PAYLOAD + 1)), Signal(range(MAX_WORDS + 1))
         number = Signal(range(self._num_readable))
         address = Signal(len(self.request.payload), reset_less=True)
-        size = 1 << _GROUP_BITS
-        groups = [Array(readable[start:start + size])[number[:_GROUP_BITS]]
-                  for start in range(0, len(readable), size)]
-        rows = [Signal(32, name=f"row{each}", reset_less=True) for each in range(len(groups))]
-        for each, register in enumerate(registers):
-            with m.If(setting[each]):
-                m.d.sync += register.eq(second)
-        value, word = Signal(32, reset_less=True), Signal(32, reset_less=True)
+        word = Signal(32, reset_less=True)
+        m.d.comb += [file.set.number.eq(number), file.set.word.eq(second), file.number.eq(number)]
 
         # What a frame is, and whether what it asks for can be done
         is_same, follows, refusal = Signal(reset_less=True), Signal(reset_less=True), Signal(8, reset_less=True)
@@ -145,7 +136,7 @@ class HostPort(wiring.Component):
             self.write.payload.mask.eq(-1), self.request.payload.eq(address),
         ]
         opening = [first, Const(VERSION, 32), Const(MAX_WORDS, 32), Const(self._num_words, 32),
-                   Const(len(registers), 32), Const(self._num_readable, 32)]
+                   Const(num_registers, 32), Const(self._num_readable, 32)]
         with m.FSM():
             with m.State("idle"):
                 m.d.comb += receiver.reading.eq(receiver.frame.valid)
@@ -203,8 +194,7 @@ class HostPort(wiring.Component):
                         with m.Case(Command.READ):
                             m.next = "read"
                         with m.Case(Command.SET):
-                            m.d.sync += [set_now.eq(~doubled & (number == each))
-                                         for each, set_now in enumerate(setting)]
+                            m.d.comb += file.set.valid.eq(~doubled)
                         with m.Case(Command.GET):
                             m.next = "get"
                         with m.Case(Command.START):
@@ -252,17 +242,14 @@ class HostPort(wiring.Component):
                 with m.If(answers.i.ready):
                     m.next = "fetch"
             with m.State("fetch"):
-                # One of sixteen, and which sixteen: together too much for one cycle.
-                m.d.sync += [row.eq(each) for row, each in zip(rows, groups, strict=True)]
                 m.next = "choose"
             with m.State("choose"):
-                m.d.sync += [value.eq(Array(rows)[number[_GROUP_BITS:]]), number.eq(number + 1)]
                 m.next = "value"
             with m.State("value"):
-                m.d.comb += [answers.i.valid.eq(1), answers.i.payload.word.eq(value),
+                m.d.comb += [answers.i.valid.eq(1), answers.i.payload.word.eq(file.value),
                              answers.i.payload.last.eq(left == 1)]
                 with m.If(answers.i.ready):
-                    m.d.sync += left.eq(left - 1)
+                    m.d.sync += [left.eq(left - 1), number.eq(number + 1)]
                     m.next = "fetch"
                     with m.If(left == 1):
                         m.d.comb += finished.eq(1)
