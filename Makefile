@@ -2,16 +2,19 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
+PYTEST := $(BIN)/pytest --numprocesses auto --dist loadgroup --durations 10
 SCENES ?= ../shared/scenes
 BOARD  ?= ulx3s_85f
 SEEDS  ?= 1
 
-.PHONY: help setup render test lint first-light fpu-report arithmetic fpu-pairs mutants damage pipeline chart bench stability \
+.PHONY: help setup render test test-chips proofs lint first-light fpu-report arithmetic fpu-pairs mutants damage pipeline chart bench stability \
 	cracks sdram bitstream board clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"
-	@echo "make test         every test"
+	@echo "make test         every test of a unit, a model or a tool"
+	@echo "make test-chips   whole chips and boards, simulated, against their models"
+	@echo "make proofs       what a solver shows of queues, caches and units"
 	@echo "make lint         ruff"
 	@echo "make first-light  the figures of docs/first-light.md, from the scenes in SCENES=$(SCENES)"
 	@echo "make fpu-report   the figures of docs/fpu.md: every operator placed and routed; PEER=FILE puts others' beside ours"
@@ -41,7 +44,13 @@ render: setup
 	$(BIN)/dynrt render room --output build/render/room.png --report build/render/room.json
 
 test: setup
-	$(BIN)/pytest --numprocesses auto --dist loadgroup
+	$(PYTEST) -m "not chip and not proof"
+
+test-chips: setup
+	$(PYTEST) -m chip
+
+proofs: setup
+	$(PYTEST) -m "proof and not slow"
 
 lint: setup
 	$(BIN)/ruff check

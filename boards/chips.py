@@ -6,8 +6,8 @@ from rtl.program.features import ShaderFeatures
 
 __all__ = ["FULL", "SIMPLE", "SMALL"]
 
-#: All that the shader can do, with adders a stage deeper for its clock. The paper's 64 threads would take more block RAMs
-#: than an LFE5U-85F has.
+#: All that the shader can do, with adders a stage deeper for its clock. The paper's 64 threads would take more block
+#: RAMs than an LFE5U-85F has.
 FULL = ChipConfig(num_threads=32, add_latency=7, shader=ShaderFeatures(depth=4))
 #: Colours and a cosine, the paper's format and caches, for an LFE5U-45F.
 SIMPLE = ChipConfig(num_threads=32)

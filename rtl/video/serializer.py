@@ -14,7 +14,7 @@ class Serializer(wiring.Component):
     """Shifts symbols out, two bits a clock of the domain ``shift``, which is five times as fast as ``pixel``.
 
     Both clocks come from one PLL, in any phase: a symbol is taken in the middle of the pixel clock that it stays for,
-    found once after reset. Latency about a pixel clock and a half; throughput a symbol a pixel clock. What follows is
+    found once after reset. Latency about two pixel clocks; throughput a symbol a pixel clock. What follows is
     the board's: a register such as ECP5's ODDRX1F, whose D0 is bit 0.
 
     Parameters
@@ -46,8 +46,11 @@ class Serializer(wiring.Component):
                       ring.eq(Cat(ring[-1] | found, ring[:-1])),
                       # Five clocks after the beat was seen: two are in ``found`` and here.
                       takes.eq(ring[2])]
+        # A clock is 3 ns, hardly more than a wire to the pins, which lie apart: two clocks are for the way.
+        leaving = Signal.like(self.pairs, reset_less=True)
         for channel in range(self._num_channels):
             rest = Signal(10, name=f"rest{channel}", reset_less=True)
-            m.d.shift += rest.eq(Mux(takes, held.word_select(channel, 10), rest >> 2))
-            m.d.comb += self.pairs[channel].eq(rest[:2])
+            m.d.shift += [rest.eq(Mux(takes, held.word_select(channel, 10), rest >> 2)),
+                          leaving[channel].eq(rest[:2])]
+        m.d.shift += self.pairs.eq(leaving)
         return m

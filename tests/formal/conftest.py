@@ -1,5 +1,7 @@
 """Proofs that take longer than half a minute are made only when they are asked for: ``pytest -m slow``."""
 
+import re
+
 import pytest
 
 
@@ -8,7 +10,7 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(config, items):
-    if config.option.markexpr:
+    if re.search(r"(?<!not )\bslow\b", config.option.markexpr):
         return
     for item in items:
         if item.get_closest_marker("slow"):

@@ -205,6 +205,7 @@ def test_a_pixel_that_differs_is_counted(monkeypatch, drawn):
     assert picture.startswith(b"\x89PNG")
 
 
+@pytest.mark.chip
 @pytest.mark.xdist_group("chip")
 def test_the_chip_itself_here_and_on_a_cluster(docs):
     """All but the simulator's speed is the same, whoever measures."""

@@ -217,6 +217,7 @@ def corner(tmp_path):
 VIEW = "--camera", "5,4,3,0,0,0,0,0,1,60", "--size", "32x24"
 
 
+@pytest.mark.chip
 @pytest.mark.xdist_group("chip")
 def test_a_chip_is_fitted_written_and_draws_as_its_model(tmp_path, corner, monkeypatch):
     monkeypatch.setenv("DYNRT_OPTIMISE", "-O0")

@@ -66,6 +66,7 @@ def test_model_reports_how_far_it_is_from_golden(tmp_path):
     assert described["format"] == "8.23"
 
 
+@pytest.mark.chip
 @pytest.mark.xdist_group("chip")
 def test_rtl_report_has_what_tools_rely_on(tmp_path):
     report = tmp_path / "report.json"
@@ -158,6 +159,7 @@ def test_frames_as_a_gif(tmp_path):
         assert np.abs(picture - color).mean() < 6
 
 
+@pytest.mark.chip
 @pytest.mark.xdist_group("chip")
 def test_frames_by_one_chip(tmp_path):
     result = run("render", "walk", "-o", tmp_path / "w.png", "--size", "32x24", "--frames", "3", "--report",
@@ -376,6 +378,7 @@ def test_compressed_ply(tmp_path):
     assert (np.load(hits)["prim_id"] == 0).any()
 
 
+@pytest.mark.chip
 @pytest.mark.xdist_group("chip")
 def test_ctrl_c_leaves_nothing(tmp_path):
     # More than a minute's work, compiling the chip not counted.

@@ -90,6 +90,7 @@ def bench():
     return library, models
 
 
+@pytest.mark.chip
 @pytest.mark.xdist_group("standalone")
 def test_pictures_in_turn_on_the_screen(bench):
     library, models = bench

@@ -14,7 +14,7 @@ from sim.scene.compile import compile_scene
 from .scenes import instances_scene, soup_scene
 
 # Its kernels are compiled once.
-pytestmark = pytest.mark.xdist_group("arithmetic")
+pytestmark = [pytest.mark.chip, pytest.mark.xdist_group("arithmetic")]
 
 FMT = FloatFormat(5, 8)
 SIZE = 4, 4

@@ -18,7 +18,7 @@ from .scenes import instances_scene, soup_scene
 from .test_chip import SIMPLE
 
 # One worker compiles the board for all of these.
-pytestmark = pytest.mark.xdist_group("board")
+pytestmark = [pytest.mark.chip, pytest.mark.xdist_group("board")]
 
 MODE = VideoMode(name="small", pixel_mhz=40.0, width=64, h_front=8, h_sync=12, h_back=12, height=48, v_front=2,
                  v_sync=2, v_back=3)

@@ -20,7 +20,7 @@ from sim.stability.truth import scene_of
 from .scenes import instances_scene, soup_scene
 
 # Compiled chips are kept; one worker for all of these compiles each only once.
-pytestmark = pytest.mark.xdist_group("chip")
+pytestmark = [pytest.mark.chip, pytest.mark.xdist_group("chip")]
 
 #: The default chip, and one in which everything is short: caches, queues, mailbox, threads.
 CHIPS = {

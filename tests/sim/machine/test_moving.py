@@ -18,6 +18,8 @@ from sim.scene.compile import CompiledScene
 from .scenes import instances_scene
 from .test_shading import CHIPS
 
+pytestmark = pytest.mark.chip
+
 # Compiled chips are kept; one worker for all of these compiles each only once.
 of_the_chip = pytest.mark.xdist_group("chip")
 

@@ -13,7 +13,7 @@ from .scenes import instances_scene
 from .test_chip import SIMPLE
 
 # Compiled chips are kept; one worker for all of these compiles each only once.
-pytestmark = pytest.mark.xdist_group("sdram")
+pytestmark = [pytest.mark.chip, pytest.mark.xdist_group("sdram")]
 
 
 @pytest.mark.parametrize("scene", ["room", "instances"])

@@ -15,7 +15,7 @@ from sim.scene.compile import CompiledScene
 from ..golden.rooms import CHECKED, ball, quad, scene_of
 
 # Compiled chips are kept; one worker for all of these compiles each only once.
-pytestmark = pytest.mark.xdist_group("shading_chip")
+pytestmark = [pytest.mark.chip, pytest.mark.xdist_group("shading_chip")]
 
 SWITCHES = ("reflection", "refraction", "transparency", "textures", "highlights", "fresnel", "emission",
             "point_lights", "spot_lights", "directional_lights", "fading_lights", "shadows", "sky", "instances",

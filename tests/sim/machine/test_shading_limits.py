@@ -8,7 +8,7 @@ from sim.scene import Camera, Light, Material
 from ..golden.rooms import quad, scene_of
 from .test_shading import CHIPS, assert_equal, floor
 
-pytestmark = pytest.mark.xdist_group("shading_chip")
+pytestmark = [pytest.mark.chip, pytest.mark.xdist_group("shading_chip")]
 
 CHIP = CHIPS["mirrors and shadows, two pipelines"]
 
