@@ -17,7 +17,7 @@ _ONE, _TWO, _WORD = 16, 32, 36
 
 def _belongs_in_block(width, depth):
     """Whether block RAM is worth it: for what one distributed memory does not hold only if it is well used."""
-    return depth > _TWO or (depth > _ONE and width / (-(-width // _WORD) * _WORD) > 1 / 2)
+    return depth > _TWO or (depth > _ONE and width / (-(-width // _WORD) * _WORD) > 3 / 5)
 
 
 class Queue(wiring.Component):
@@ -37,7 +37,7 @@ class Queue(wiring.Component):
         as deep as there are threads, say. That it is right is asserted in simulation.
     block : bool or None
         Whether block RAM keeps them. By default what is more than the 32 elements of two distributed memories, and
-        one in the register; and what is more than 16 and one if its words fill half of block RAMs'.
+        one in the register; and what is more than 16 and one if its words fill three fifths of block RAMs'.
 
     Members
     -------
