@@ -1,5 +1,7 @@
 """``dynrt``, the command."""
 
+import gc
+
 import click
 
 from .arithmetic import arithmetic
@@ -26,6 +28,8 @@ __all__ = ["main"]
 @click.version_option(package_name="dynrt")
 def main():
     """DynRT: a real-time ray tracer in hardware, simulated."""
+    # To elaborate a chip makes millions of objects that stay, and looking through them for garbage takes a third of it.
+    gc.set_threshold(200_000, 20, 20)
 
 
 main.add_command(arithmetic)
