@@ -1,5 +1,7 @@
 """Ten bits a pixel as two bits a clock, for a pin with a double data rate."""
 
+from itertools import pairwise
+
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, wiring
 from amaranth.lib.cdc import FFSynchronizer
@@ -28,6 +30,9 @@ class Serializer(wiring.Component):
     pairs : array of two bits, of the domain ``shift``, of which bit 0 goes first
     """
 
+    #: Clocks of ``shift`` between the register that a symbol is taken into and the pins
+    way = 2
+
     def __init__(self, *, num_channels):
         self._num_channels = num_channels
         super().__init__({"symbols": In(data.ArrayLayout(10, num_channels)),
@@ -47,10 +52,12 @@ class Serializer(wiring.Component):
                       # Five clocks after the beat was seen: two are in ``found`` and here.
                       takes.eq(ring[2])]
         # A clock is 3 ns, hardly more than a wire to the pins, which lie apart: two clocks are for the way.
-        leaving = Signal.like(self.pairs, reset_less=True)
+        leaving = [Signal.like(self.pairs, name=f"leaving{stage}", reset_less=True) for stage in range(self.way)]
         for channel in range(self._num_channels):
             rest = Signal(10, name=f"rest{channel}", reset_less=True)
             m.d.shift += [rest.eq(Mux(takes, held.word_select(channel, 10), rest >> 2)),
-                          leaving[channel].eq(rest[:2])]
-        m.d.shift += self.pairs.eq(leaving)
+                          leaving[0][channel].eq(rest[:2])]
+        for before_it, stage in pairwise(leaving):
+            m.d.shift += stage.eq(before_it)
+        m.d.comb += self.pairs.eq(leaving[-1])
         return m
