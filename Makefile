@@ -7,8 +7,8 @@ SCENES ?= ../shared/scenes
 BOARD  ?= ulx3s_85f
 SEEDS  ?= 1
 
-.PHONY: help setup render test test-chips proofs lint first-light fpu-report arithmetic fpu-pairs mutants damage pipeline chart bench stability \
-	cracks sdram bitstream board clean
+.PHONY: help setup render test test-chips proofs lint first-light fpu-report arithmetic fpu-pairs mutants damage pipeline \
+	chart bench stability cracks sdram bitstream board clean
 
 help:
 	@echo "make render       draw the built-in room on the simulated chip: build/render/room.png"

@@ -1,8 +1,8 @@
 """``dynrt``, the command."""
 
-import gc
-
 import click
+
+from sim.garbage import collect_rarely
 
 from .arithmetic import arithmetic
 from .bench import bench
@@ -28,8 +28,7 @@ __all__ = ["main"]
 @click.version_option(package_name="dynrt")
 def main():
     """DynRT: a real-time ray tracer in hardware, simulated."""
-    # To elaborate a chip makes millions of objects that stay, and looking through them for garbage takes a third of it.
-    gc.set_threshold(200_000, 20, 20)
+    collect_rarely()
 
 
 main.add_command(arithmetic)
