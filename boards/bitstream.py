@@ -65,7 +65,7 @@ def board_design(board, *, config, clock_mhz, scene=None):
 
 def _arguments(board, design, target_mhz):
     device = design.device
-    # Wires are a sixth shorter than by the default placer, with which router2 ends with many more that have two nets.
+    # With its shorter wires router2 gets farther than after the default placer: docs/decisions/013.
     # What is too slow is wanted for the report; pack_bitstream refuses it.
     return (device.option, "--package", device.package, "--speed", str(board.grade), "--lpf", "top.lpf",
             "--freq", str(target_mhz), "--timing-allow-fail", "--placer", "static", "--router", "router2")

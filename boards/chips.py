@@ -9,7 +9,8 @@ __all__ = ["FULL", "SIMPLE", "SMALL"]
 #: All that the shader can do, with adders a stage deeper for its clock. The paper's 64 threads would take more block
 #: RAMs than an LFE5U-85F has.
 FULL = ChipConfig(num_threads=32, add_latency=7, shader=ShaderFeatures(depth=4))
-#: Colours and a cosine, the paper's format and caches, for an LFE5U-45F. Stacks of 32 would leave no block RAM free.
+#: Colours and a cosine, the paper's format and caches, for an LFE5U-45F. Stacks of 32 would need two block
+#: RAMs more than it has.
 SIMPLE = ChipConfig(num_threads=32, stack_depth=16)
 #: For an LFE5U-25F: as many threads and lines as its 56 block RAMs hold, in a format in which the room looks right;
 #: with as few stages as its clock asks for, as flip-flops and what delays beside them would fill it.

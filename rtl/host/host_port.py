@@ -242,6 +242,7 @@ class HostPort(wiring.Component):
                 with m.If(answers.i.ready):
                     m.next = "fetch"
             with m.State("fetch"):
+                # The register file takes two cycles.
                 m.next = "choose"
             with m.State("choose"):
                 m.next = "value"

@@ -24,7 +24,7 @@ class RegisterFile(wiring.Component):
     -------
     set : ``{"valid", "number", "word"}``: a register, and what it is to hold; beyond the registers there is none
     number : of what is to be read
-    value : 0 if there is none of the number; what is set meanwhile may be missing
+    value : of the number, if there is one; what is set meanwhile may be missing
     registers : what has been set, zeros after reset
     values : behind the registers, what can be read
     """
