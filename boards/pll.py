@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from itertools import product
 
-from amaranth.hdl import ClockSignal, Instance, Module
+from amaranth.hdl import ClockSignal, Instance, Module, ResetSignal, Signal
 from amaranth.lib import wiring
-from amaranth.lib.cdc import ResetSynchronizer
+from amaranth.lib.cdc import AsyncFFSynchronizer, ResetSynchronizer
 from amaranth.lib.wiring import In, Out
 
 __all__ = ["Clock", "Pll", "PllPlan", "plan_pll"]
@@ -33,12 +33,16 @@ class Clock:
         By how much it is later than the first of its PLL.
     reset : bool
         Whether the domain has a reset, until the PLL has locked.
+    global_reset : bool
+        Whether the reset goes by one of the device's global networks: for flip-flops all over it, at clocks that
+        leave it the time to get to the device's middle first.
     """
 
     domain: str
     mhz: float
     lag_ns: float = 0
     reset: bool = True
+    global_reset: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +153,12 @@ class Pll(wiring.Component):
                            # Of no phase is a divider's last period.
                            f"p_{output}_CPHASE": divider - 1 + phase, f"p_{output}_FPHASE": 0}
             outputs[f"o_{output}"] = ClockSignal(clock.domain)
-            if clock.reset:
+            if clock.reset and clock.global_reset:
+                reset = Signal(name=f"{clock.domain}_reset")
+                m.submodules[f"{clock.domain}_reset"] = AsyncFFSynchronizer(~self.locked, reset, o_domain=clock.domain)
+                m.submodules[f"{clock.domain}_reset_buffer"] = Instance("DCCA", i_CLKI=reset,
+                                                                        o_CLKO=ResetSignal(clock.domain))
+            elif clock.reset:
                 m.submodules[f"{clock.domain}_reset"] = ResetSynchronizer(~self.locked, domain=clock.domain)
         m.submodules.pll = Instance(
             "EHXPLLL", a_ICP_CURRENT="12", a_LPF_RESISTOR="8", a_MFG_ENABLE_FILTEROPAMP="1", a_MFG_GMCREF_SEL="2",

@@ -60,7 +60,7 @@ def build(board, parameters, scene, clock_mhz, seeds, output, docs):
             routed = []
             for seed in range(1, seeds + 1):
                 progress(f"place and route, seed {seed} of {seeds}")
-                routed.append(route(chosen, design, seed=seed, target_mhz=target))
+                routed.append(route(chosen, design, seed=seed, clocks=clocks))
                 console.print(words(routed[-1], clocks), markup=False, soft_wrap=True)
         report = built(chosen, config, clocks, routed, tools)
         try:
@@ -76,7 +76,7 @@ def build(board, parameters, scene, clock_mhz, seeds, output, docs):
                           "--seeds")
         best = max((each for each in routed if not each.too_slow(clocks)), key=lambda each: each.mhz["sync"])
         with written_whole(output / f"{board}.bit") as path:
-            path.write_bytes(pack_bitstream(chosen, design, seed=best.seed, target_mhz=target, clocks=clocks))
+            path.write_bytes(pack_bitstream(chosen, design, seed=best.seed, clocks=clocks))
         then = f", then dynrt load SCENE --port ... --chip {output / 'chip.json'}" if scene is None else ""
         console.print(f"{output / f'{board}.bit'}: seed {best.seed}, the chip at {clocks['sync']:g} MHz; load it with "
                       f"openFPGALoader{then}", markup=False, soft_wrap=True)

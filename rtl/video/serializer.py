@@ -55,7 +55,8 @@ class Serializer(wiring.Component):
         leaving = [Signal.like(self.pairs, name=f"leaving{stage}", reset_less=True) for stage in range(self.way)]
         for channel in range(self._num_channels):
             rest = Signal(10, name=f"rest{channel}", reset_less=True)
-            m.d.shift += [rest.eq(Mux(takes, held.word_select(channel, 10), rest >> 2)),
+            # What comes in behind is never sent; zeros would become resets, for which a clock has no time.
+            m.d.shift += [rest.eq(Mux(takes, held.word_select(channel, 10), rest.rotate_right(2))),
                           leaving[0][channel].eq(rest[:2])]
         for before_it, stage in pairwise(leaving):
             m.d.shift += stage.eq(before_it)

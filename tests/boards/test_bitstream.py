@@ -1,6 +1,7 @@
 """A board's design, before it is synthesised: its pins and clocks, and that it is the same each time."""
 
 import hashlib
+import json
 import os
 import re
 import subprocess
@@ -61,9 +62,23 @@ def test_what_cannot_be():
 
 
 @pytest.mark.parametrize(("net", "domain"), [
-    ("$glbnet$clk", "sync"), ("clk", "sync"), ("$glbnet$pixel_clk", "pixel"), ("shift_clk", "shift")])
+    ("$glbnet$clk", "sync"), ("clk", "sync"), ("$glbnet$pixel_clk", "pixel"), ("shift_clk", "shift"),
+    ("$glbnet$component.clk", "sync"), ("$glbnet$component.display.bars.pixel_clk", "pixel")])
 def test_nets_of_clocks(net, domain):
     assert bitstream._domain(net) == domain
+
+
+def test_more_is_worked_for_than_is_wanted():
+    """On the net of each clock by one of its names, and on no other."""
+    cells = {"chip.pll": {"type": "EHXPLLL", "connections": {"CLKOP": [5], "CLKOS": [6], "CLKOS2": [], "CLKI": [3],
+                                                             "LOCK": [7]}},
+             "other": {"type": "TRELLIS_FF", "connections": {"CLK": [8]}}}
+    names = {"oscillator_clk": [3], "a.b.clk": [5], "a.pixel_clk": [6], "locked": [7], "lost_clk": [8], "wide": [5, 6]}
+    netlist = json.dumps({"modules": {"top": {"cells": cells, "netnames": {name: {"bits": bits}
+                                                                           for name, bits in names.items()}}}})
+    design = Design(name="small", files={"top.lpf": "BLOCK ASYNCPATHS;"}, script="")
+    assert bitstream._constraints(design, netlist, {"sync": 100.0, "pixel": 64.0, "shift": 320.0}).splitlines() == [
+        "BLOCK ASYNCPATHS;", 'FREQUENCY NET "a.b.clk" 150.000 MHZ;', 'FREQUENCY NET "a.pixel_clk" 96.000 MHZ;']
 
 
 def test_what_is_too_slow_is_not_packed(monkeypatch):
@@ -76,4 +91,4 @@ def test_what_is_too_slow_is_not_packed(monkeypatch):
     assert routed.too_slow(clocks) == {"sync": 49.9}
     assert routed.too_slow(clocks | {"sync": 49.0}) == {}
     with pytest.raises(ToolError, match=r"^small, seed 3: timing is not met in sync; there is no bitstream$"):
-        bitstream.pack_bitstream(board, Design(name="small", files={}, script=""), seed=3, target_mhz=50, clocks=clocks)
+        bitstream.pack_bitstream(board, Design(name="small", files={}, script=""), seed=3, clocks=clocks)

@@ -166,7 +166,7 @@ def test_timing_is_met_by_one_placement_or_not():
 def test_build_writes_a_bitstream_only_if_it_is_fast_enough(mhz, tmp_path, monkeypatch):
     placed = []
 
-    def route(board, design, *, seed, target_mhz):
+    def route(board, design, *, seed, clocks):
         placed.append(seed)
         return routed(seed, sync=mhz - seed)
 
