@@ -8,9 +8,9 @@ __all__ = ["FULL", "SIMPLE", "SMALL"]
 
 #: All that the shader can do, with adders a stage deeper for its clock. The paper's 64 threads would take more block
 #: RAMs than an LFE5U-85F has; with 32, nine in ten, nextpnr finds no way for all wires in their rows. A line of a cache
-#: is as wide as its block RAMs, which have 512 rows.
-FULL = ChipConfig(num_threads=16, add_latency=7, shader=ShaderFeatures(depth=4), node_lines=512, list_lines=512,
-                  matrix_lines=512, shading_lines=512, texture_lines=512)
+#: is as wide as its block RAMs, which have 512 rows. In 32 MB there are at most four million nodes.
+FULL = ChipConfig(num_threads=16, add_latency=7, index_width=22, shader=ShaderFeatures(depth=4), node_lines=512,
+                  list_lines=512, matrix_lines=512, shading_lines=512, texture_lines=512)
 #: Colours and a cosine, the paper's format and caches, for an LFE5U-45F. Stacks of 32 would need two block
 #: RAMs more than it has.
 SIMPLE = ChipConfig(num_threads=32, stack_depth=16, add_latency=7)

@@ -14,13 +14,15 @@ __all__ = ["WORD_WIDTH", "Cache"]
 WORD_WIDTH = 32
 
 # Of requests that look up, and of their answers until they are taken
-_NUM_LOOKUPS = 9
+_NUM_LOOKUPS = 12
+# Of a lookup: who it is, its place, two of the memories, and whether it is found
+_STAGES = 5
 
 
 class Cache(wiring.Component):
     """Answers item numbers with items; answers to different requests may overtake each other.
 
-    A request that finds its line is answered after 5 cycles, one a clock. One that does not waits in a queue;
+    A request that finds its line is answered after 6 cycles, one a clock. One that does not waits in a queue;
     the head of that queue fetches its line, or, when that line is on its way or has just come, waits for it
     and looks again. Whoever fetches a line is the first to look when it has come, and whoever looked again in vain
     fetches: two threads that evict each other's lines cannot do so forever. A line that comes takes the place of
@@ -42,6 +44,8 @@ class Cache(wiring.Component):
         Lines that may be on their way at a time.
     num_waiting : int
         Requests that may be in the cache at a time (the caller's promise).
+    answers_in_block : bool
+        Whether answers wait in block RAM; else in distributed memories, six tables for four bits.
 
     Members
     -------
@@ -60,13 +64,14 @@ class Cache(wiring.Component):
     """
 
     def __init__(self, *, item_width, payload_shape, index_width, num_lines, line_items=1, num_fetches=4,
-                 num_waiting):
+                 num_waiting, answers_in_block=False):
         self._item_width = item_width
         self._item_words = -(-item_width // WORD_WIDTH)
         self._num_lines = num_lines
         self._line_items = line_items
         self._num_fetches = num_fetches
         self._num_waiting = num_waiting
+        self._answers_in_block = answers_in_block
         if self.line_words < 2:
             raise ValueError("A line of a cache has a single word; it must have 2 or more")
         self._slot_bits = exact_log2(num_lines)
@@ -119,52 +124,54 @@ class Cache(wiring.Component):
         # while a line is written.
         owner, owner_looks = Signal(request_layout, reset_less=True), Signal()
         head, again = Signal(request_layout, reset_less=True), Signal()
-        comes, allowed = Signal(), Signal()
+        comes, will_come, allowed = Signal(), Signal(), Signal()
         first = Signal(request_layout)
+        # A fetch needs an answer too, and lookups leave it one. Said a cycle before, in which two may be promised.
+        m.d.sync += allowed.eq((promised < max_promised - 3) & ~will_come & ~comes)
         m.d.comb += [
-            # A fetch needs an answer too, and lookups leave it one.
-            allowed.eq((promised < max_promised - 1) & ~comes & ~owner_looks),
             starts.eq(allowed & (again | requests.o.valid)),
             requests.o.ready.eq(allowed & ~again),
             first.eq(Mux(owner_looks, owner, Mux(again, head, requests.o.payload))),
         ]
         about_layout = data.StructLayout({"valid": 1, "repeated": 1})
-        about = [Signal(about_layout, name=f"about{stage}") for stage in range(4)]
-        looking = [Signal(request_layout, name=f"looking{stage}", reset_less=True) for stage in range(4)]
+        about = [Signal(about_layout, name=f"about{stage}") for stage in range(_STAGES)]
+        looking = [Signal(request_layout, name=f"looking{stage}", reset_less=True) for stage in range(_STAGES)]
         m.d.comb += [
             about[0].valid.eq(starts | owner_looks),
             about[0].repeated.eq(again | owner_looks),
             looking[0].eq(first),
         ]
-        for stage in range(3):
+        for stage in range(_STAGES - 1):
             m.d.sync += [about[stage + 1].eq(about[stage]), looking[stage + 1].eq(looking[stage])]
+        # Many memories, and a choice of three before them: from a register.
         for rows in (tags, lines):
-            m.d.comb += [rows.reading.eq(about[0].valid), rows.address.eq(self._line(first)[:self._slot_bits])]
-        compared, found, item = looking[2], Signal(), Signal(self._item_width, reset_less=True)
+            m.d.comb += [rows.reading.eq(about[1].valid), rows.address.eq(self._line(looking[1])[:self._slot_bits])]
+        compared, found, item = looking[-2], Signal(), Signal(self._item_width, reset_less=True)
         m.d.sync += [
             found.eq(tags.data.valid & (tags.data.tag == self._line(compared)[self._slot_bits:])),
             item.eq(self._select_item(lines.data, compared.index)),
         ]
 
         m.submodules.answers = answers = Queue(self._response_layout, depth=max_promised, always_ready=True,
-                                               block=False)
+                                               block=self._answers_in_block)
         waiting_layout = data.StructLayout({"request": request_layout, "in_vain": 1})
         m.submodules.waiting = waiting = Queue(waiting_layout, depth=self._num_waiting, always_ready=True)
         wiring.connect(m, answers.o, wiring.flipped(self.response))
         m.d.comb += [
-            vain.eq(about[3].valid & ~found),
-            self.hit.eq(about[3].valid & found & ~about[3].repeated),
-            self.miss.eq(vain & ~about[3].repeated),
-            answers.i.valid.eq(about[3].valid & found),
+            vain.eq(about[-1].valid & ~found),
+            self.hit.eq(about[-1].valid & found & ~about[-1].repeated),
+            self.miss.eq(vain & ~about[-1].repeated),
+            answers.i.valid.eq(about[-1].valid & found),
             answers.i.payload.item.eq(item),
-            answers.i.payload.payload.eq(looking[3].payload),
+            answers.i.payload.payload.eq(looking[-1].payload),
             waiting.i.valid.eq(vain),
-            waiting.i.payload.request.eq(looking[3]),
-            waiting.i.payload.in_vain.eq(about[3].repeated),
+            waiting.i.payload.request.eq(looking[-1]),
+            waiting.i.payload.in_vain.eq(about[-1].repeated),
         ]
         issue = self._decide(m, waiting.o, head=head, again=again, again_starts=again & allowed, claims=claims,
                              may_claim=promised < max_promised, comes=comes)
-        self._fill(m, tags, lines, head=head, issue=issue, owner=owner, owner_looks=owner_looks, comes=comes)
+        self._fill(m, tags, lines, head=head, issue=issue, owner=owner, owner_looks=owner_looks, comes=comes,
+                   will_come=will_come)
         self._forget(m, tags)
         return m
 
@@ -179,14 +186,17 @@ class Cache(wiring.Component):
         on_its_way, has_come, free = Signal(), Signal(), Signal()
         fetch = Signal()
         issue = Signal()
+        # So that who waits is not to wait within a cycle for whether memory has room.
+        m.submodules.line_requests = line_requests = Queue(self._line_width, depth=2)
+        wiring.connect(m, line_requests.o, wiring.flipped(self.line_request))
         m.d.comb += [
             on_its_way.eq((same & Cat(place.busy for place in fetches)).any()),
             has_come.eq(same.any() & ~in_vain),
             free.eq(~Cat(place.busy for place in fetches).all()),
             claims.eq(has_head & ~on_its_way & ~has_come & free & may_claim & ~fetch),
-            self.line_request.valid.eq(fetch),
-            self.line_request.payload.eq(self._line(head)),
-            issue.eq(fetch & self.line_request.ready),
+            line_requests.i.valid.eq(fetch),
+            line_requests.i.payload.eq(self._line(head)),
+            issue.eq(fetch & line_requests.i.ready),
             waiting.ready.eq(~has_head),
         ]
         # One step of the way to a decision a cycle: none is urgent, as the line takes many.
@@ -215,33 +225,33 @@ class Cache(wiring.Component):
                 m.d.sync += number.eq(Mux(number == self._num_fetches - 1, 0, number + 1))
         return issue
 
-    def _fill(self, m, tags, lines, *, head, issue, owner, owner_looks, comes):
-        """Gathers a line's words and writes it a cycle after the last."""
+    def _fill(self, m, tags, lines, *, head, issue, owner, owner_looks, comes, will_come):
+        """Gathers a line's words and writes it two cycles after the last, when no lookup that has begun reads."""
         m.submodules.owners = owners = Queue(self._request_layout, depth=self._num_fetches, always_ready=True)
         line_bits = self.line_words * WORD_WIDTH
-        gathered = Signal(line_bits, reset_less=True)
+        gathered, whole = Signal(line_bits, reset_less=True), Signal(line_bits, reset_less=True)
         count = Signal(range(self.line_words))
-        last = Signal()
-        line = self._line(owners.o.payload)
+        # When the owner looks its line is written, to be read a cycle later.
+        line = self._line(owner)
         m.d.comb += [
             owners.i.payload.eq(head),
             owners.i.valid.eq(issue),
             owners.o.ready.eq(comes),
-            last.eq(self.line_data.valid & (count == self.line_words - 1)),
-            lines.write.valid.eq(comes),
+            will_come.eq(self.line_data.valid & (count == self.line_words - 1)),
+            lines.write.valid.eq(owner_looks),
             lines.write.address.eq(line[:self._slot_bits]),
-            lines.write.data.eq(gathered),
-            tags.write.valid.eq(comes),
+            lines.write.data.eq(whole),
+            tags.write.valid.eq(owner_looks),
             tags.write.address.eq(line[:self._slot_bits]),
             tags.write.data.valid.eq(1),
             tags.write.data.tag.eq(line[self._slot_bits:]),
         ]
-        m.d.sync += [comes.eq(last), owner_looks.eq(comes), owner.eq(owners.o.payload),
+        m.d.sync += [comes.eq(will_come), owner_looks.eq(comes), owner.eq(owners.o.payload), whole.eq(gathered),
                      Assert(~comes | owners.o.valid, "a line comes that nobody has asked for")]
         with m.If(self.line_data.valid):
             # The newest word comes on top of those before it.
             m.d.sync += [gathered.eq(Cat(gathered, self.line_data.payload)[WORD_WIDTH:]),
-                         count.eq(Mux(last, 0, count + 1))]
+                         count.eq(Mux(will_come, 0, count + 1))]
 
     def _forget(self, m, tags):
         """Clears one tag after the other."""

@@ -46,7 +46,7 @@ class Serializer(wiring.Component):
         m.submodules.beat = FFSynchronizer(beat, seen, o_domain="shift")
         m.d.pixel += [held.eq(self.symbols), beat.eq(~beat)]
         # ``held`` has stayed for 2 to 3 of its 5 clocks when its beat is seen; from then on a ring of bits counts.
-        ring, takes = Signal(_PAIRS), Signal()
+        ring, takes = Signal(_PAIRS), Signal(reset_less=True)
         m.d.shift += [before.eq(seen), found.eq((seen != before) & ~aligned), aligned.eq(aligned | found),
                       ring.eq(Cat(ring[-1] | found, ring[:-1])),
                       # Five clocks after the beat was seen: two are in ``found`` and here.

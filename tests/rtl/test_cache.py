@@ -8,11 +8,12 @@ from rtl.cache import Cache
 from tests.bench import simulate
 
 
-def run_cache(*, seed, num_lines, line_items, item_width, num_fetches, gap, latency, indices):
+def run_cache(*, seed, num_lines, line_items, item_width, num_fetches, gap, latency, indices, answers_in_block=False):
     rng = random.Random(seed)
     num_waiting = 7
     dut = Cache(item_width=item_width, payload_shape=16, index_width=12, num_lines=num_lines,
-                line_items=line_items, num_fetches=num_fetches, num_waiting=num_waiting)
+                line_items=line_items, num_fetches=num_fetches, num_waiting=num_waiting,
+                answers_in_block=answers_in_block)
     item_words = -(-item_width // 32)
     words = [rng.getrandbits(32) for _ in range(4096 * item_words)]
     num_requests = len(indices)
@@ -78,14 +79,15 @@ def run_cache(*, seed, num_lines, line_items, item_width, num_fetches, gap, late
     return events
 
 
+@pytest.mark.parametrize("answers_in_block", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("line_items", "item_width"), [(1, 33), (4, 32), (2, 64), (1, 288), (2, 24)])
-def test_every_request_is_answered_once_and_right(seed, line_items, item_width):
+def test_every_request_is_answered_once_and_right(seed, line_items, item_width, answers_in_block):
     # Near ones share lines; far ones, a multiple of the cache's size apart, evict each other.
     rng = random.Random(seed)
     indices = [rng.randrange(40) * rng.choice((1, 1, 8 * line_items)) for _ in range(300)]
     run_cache(seed=seed, num_lines=8, line_items=line_items, item_width=item_width, num_fetches=1 + seed,
-              gap=0.3 * (seed % 3), latency=1 + 7 * seed, indices=indices)
+              gap=0.3 * (seed % 3), latency=1 + 7 * seed, indices=indices, answers_in_block=answers_in_block)
 
 
 def test_lines_are_kept():
@@ -103,7 +105,7 @@ def test_a_line_wanted_by_all_is_fetched_once():
     assert events["lines"] == 1
 
 
-def test_a_hit_is_answered_after_5_cycles_one_a_clock():
+def test_a_hit_is_answered_after_6_cycles_one_a_clock():
     dut = Cache(item_width=32, payload_shape=8, index_width=6, num_lines=4, line_items=2, num_waiting=16)
     answered = []
 
@@ -129,7 +131,7 @@ def test_a_hit_is_answered_after_5_cycles_one_a_clock():
             await ctx.tick()
 
     simulate(dut, warm_up_and_ask, name="cache")
-    assert answered == [None] * 5 + [(number, (11, 22)[number % 2]) for number in range(25)]
+    assert answered == [None] * 6 + [(number, (11, 22)[number % 2]) for number in range(24)]
 
 
 def test_a_line_of_one_word():
