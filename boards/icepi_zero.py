@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from amaranth_boards.icepi_zero import IcepiZero1_3Platform
 
-from rtl.video.mode import XGA
+from rtl.video.mode import XGA_REDUCED
 
 from .board import Board
 from .chips import SMALL
@@ -14,4 +14,4 @@ __all__ = ["ICEPI_ZERO"]
 
 ICEPI_ZERO = Board(name="icepi_zero", title="Icepi Zero 1.3", platform=IcepiZero1_3Platform,
                    device=replace(DEVICES["LFE5U-25F"], package="CABGA256"), oscillator_mhz=50, clock_mhz=50,
-                   config=SMALL, mode=XGA)
+                   config=SMALL, mode=XGA_REDUCED)

@@ -7,7 +7,7 @@ import pytest
 from amaranth.sim import Simulator
 
 from rtl.video.display import BarScreen
-from rtl.video.mode import MODES, VGA, XGA, VideoMode
+from rtl.video.mode import MODES, VGA, XGA, XGA_REDUCED, VideoMode
 from rtl.video.serializer import Serializer
 from sim.machine.dvi_receiver import DviError, DviReceiver
 from tests.rtl.video.screen import TINY, expected_bars, received
@@ -40,6 +40,8 @@ def test_modes():
     assert VGA.refresh_hz() == pytest.approx(59.940, abs=1e-3)
     assert VGA.refresh_hz(25.0) == pytest.approx(59.524, abs=1e-3)
     assert XGA.refresh_hz() == pytest.approx(60.004, abs=1e-3)
+    assert XGA_REDUCED.refresh_hz() == pytest.approx(59.870, abs=1e-3)
+    assert (XGA_REDUCED.h_total, XGA_REDUCED.v_total) == (1184, 790)
     assert (VGA.h_total, VGA.v_total, XGA.h_total, XGA.v_total) == (800, 525, 1344, 806)
     assert MODES["1024x768"] is XGA
     with pytest.raises(ValueError, match=r"^x: v_back is 0; it must be positive$"):
