@@ -25,12 +25,13 @@ _UNIT_HEAD = ("unit", "LUT", "FF", "EBR", "MHz, worst", "MHz needed")
 def _modes(results):
     return markdown_table(
         ("mode", "pixel clock, MHz", "shift clock, MHz", "a line's pixels: visible, front porch, sync, back porch",
-         "a frame's lines, likewise", "syncs, of lines and frames", "frames a second", "wrong pixels", "largest disparity"),
+         "a frame's lines, likewise", "syncs, of lines and frames", "frames a second", "wrong pixels",
+         "largest disparity"),
         [[name, f"{mode['pixel_mhz']:g}", f"{5 * mode['pixel_mhz']:g}",
           *(", ".join(str(mode[part]) for part in parts) for parts in (
               ("width", "h_front", "h_sync", "h_back"), ("height", "v_front", "v_sync", "v_back"))),
-          ", ".join("high" if mode[f"{way}_positive"] else "low" for way in "hv"), f"{mode['refresh_hz']:.2f}", mode["wrong_pixels"],
-          mode["max_disparity"]] for name, mode in results["dvi"].items()])
+          ", ".join("high" if mode[f"{way}_positive"] else "low" for way in "hv"), f"{mode['refresh_hz']:.2f}",
+          mode["wrong_pixels"], mode["max_disparity"]] for name, mode in results["dvi"].items()])
 
 
 def _units(results):
