@@ -6,6 +6,7 @@ from sim.garbage import collect_rarely
 
 from .arithmetic import arithmetic
 from .bench import bench
+from .board_frames import board_frames
 from .build import build
 from .chart import chart
 from .cracks import cracks
@@ -33,6 +34,7 @@ def main():
 
 main.add_command(arithmetic)
 main.add_command(bench)
+main.add_command(board_frames)
 main.add_command(build)
 main.add_command(chart)
 main.add_command(cracks)
