@@ -33,6 +33,7 @@ def test_every_pin_has_a_place(name):
         found = [place for place in places if re.fullmatch(rf"sdram_0__{port}__io(\[\d+\])?", place)]
         assert len(found) == width, port
     assert {"hdmi_0__clk__p", "uart_0__rx__io", "uart_0__tx__io"} <= set(places)
+    assert len(re.findall(r"^ *cell \\DCCA ", design.files["top.il"], re.MULTILINE)) == 1, "the chip's reset is global"
     assert clocks["shift"] == pytest.approx(5 * clocks["pixel"])
     assert clocks["sync"] == clocks["sdram"] == pytest.approx(board.clock_mhz)
     assert f"FREQUENCY PORT \"clk{board.oscillator_mhz:g}_0__io\" {board.oscillator_mhz * 1e6:.1f} HZ;" in \
