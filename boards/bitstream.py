@@ -8,7 +8,7 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from . import fanout
+from . import fanout, global_reset
 from .chip import WITHOUT_CHECKS
 from .critical_path import CriticalPath, slowest
 from .design import Design, digest, keep, synthesise
@@ -26,7 +26,7 @@ _CLOCK = re.compile(r"(\$glbnet\$)?(\w+\.)*(?P<domain>\w+?)?_?clk")
 #: path for as critical as the slowest, and what is critical gives way to nothing.
 _PRESSURE = 1.5
 # Another netlist for nextpnr is another result.
-_PREPARATION = inspect.getsource(fanout)
+_PREPARATION = inspect.getsource(fanout) + inspect.getsource(global_reset)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +115,7 @@ def route(board, design, *, seed, clocks):
     arguments = _arguments(board, design, clocks)
     found, configuration = _kept(design, arguments, seed)
     if not found.exists():
-        netlist = fanout.split_fanout(synthesise(design))
+        netlist = fanout.split_fanout(global_reset.lead_reset(synthesise(design)))
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "top.json").write_text(netlist)
             (Path(folder) / "top.lpf").write_text(_constraints(design, netlist, clocks))
