@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -80,6 +81,40 @@ def test_more_is_worked_for_than_is_wanted():
     design = Design(name="small", files={"top.lpf": "BLOCK ASYNCPATHS;"}, script="")
     assert bitstream._constraints(design, netlist, {"sync": 100.0, "pixel": 64.0, "shift": 320.0}).splitlines() == [
         "BLOCK ASYNCPATHS;", 'FREQUENCY NET "a.b.clk" 150.000 MHZ;', 'FREQUENCY NET "a.pixel_clk" 96.000 MHZ;']
+
+
+def test_placed_by_criticality_and_routed_without(monkeypatch, tmp_path):
+    """Two runs of nextpnr, the second of what the first has placed; and none for what is known."""
+    monkeypatch.setenv("DYNRT_CACHE", str(tmp_path))
+    calls = []
+
+    def run_tool(name, arguments, *, folder, what):
+        calls.append(arguments)
+        (Path(folder) / "placed.json").write_text("placed")
+        path = [{"type": "clk-to-q", "delay": 0.5, "from": {"cell": "a"}, "to": {"cell": "a"}},
+                {"type": "routing", "delay": 9.5, "from": {"cell": "a"}, "to": {"cell": "b"}}]
+        (Path(folder) / "report.json").write_text(json.dumps({
+            "fmax": {"$glbnet$component.clk": {"achieved": 100.0, "constraint": 108.0}},
+            "critical_paths": [{"from": "posedge $glbnet$component.clk", "to": "posedge $glbnet$component.clk",
+                                "path": path}]}))
+        (Path(folder) / "top.config").write_text("bits")
+        (Path(folder) / "routed.json").write_text(json.dumps({"modules": {"top": {"cells": {
+            "component.a": {"type": "TRELLIS_COMB"}}}}}))
+
+    empty = json.dumps({"modules": {"top": {"ports": {}, "cells": {}, "netnames": {}}}}).encode()
+    monkeypatch.setattr(bitstream, "run_tool", run_tool)
+    monkeypatch.setattr(bitstream, "synthesise", lambda design: empty)
+    board, design = BOARDS["ulx3s_85f"], Design(name="small", files={"top.lpf": ""}, script="")
+    for _ in range(2):
+        routed = bitstream.route(board, design, seed=3, clocks={"sync": 72.0})
+    assert routed.mhz == {"sync": 100.0}
+    assert routed.path.words == "a to b: 0 cells between, 0.5 ns in cells, 9.5 ns between them"
+    placing, routing = calls
+    assert "--no-route" in placing
+    assert placing[placing.index("--seed") + 1] == "3"
+    assert placing[placing.index("--freq") + 1] == "108.000"
+    assert placing[placing.index("--write") + 1] == routing[routing.index("--json") + 1] == "placed.json"
+    assert {"--no-pack", "--no-place", "--no-tmdriv"} <= set(routing)
 
 
 def test_what_is_too_slow_is_not_packed(monkeypatch):
