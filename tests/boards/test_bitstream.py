@@ -86,11 +86,14 @@ def test_more_is_worked_for_than_is_wanted():
 def test_placed_by_criticality_and_routed_without(monkeypatch, tmp_path):
     """Two runs of nextpnr, the second of what the first has placed; and none for what is known."""
     monkeypatch.setenv("DYNRT_CACHE", str(tmp_path))
-    calls = []
+    calls, settings = [], []
 
     def run_tool(name, arguments, *, folder, what):
         calls.append(arguments)
-        (Path(folder) / "placed.json").write_text("placed")
+        if "--json" in arguments and arguments[arguments.index("--json") + 1] == "placed.json":
+            settings.append(json.loads((Path(folder) / "placed.json").read_text())["modules"]["top"]["settings"])
+        (Path(folder) / "placed.json").write_text(json.dumps({"modules": {"top": {"settings": {
+            "timing_driven": f"{1:032b}", "router": "router2"}}}}))
         path = [{"type": "clk-to-q", "delay": 0.5, "from": {"cell": "a"}, "to": {"cell": "a"}},
                 {"type": "routing", "delay": 9.5, "from": {"cell": "a"}, "to": {"cell": "b"}}]
         (Path(folder) / "report.json").write_text(json.dumps({
@@ -114,7 +117,8 @@ def test_placed_by_criticality_and_routed_without(monkeypatch, tmp_path):
     assert placing[placing.index("--seed") + 1] == "3"
     assert placing[placing.index("--freq") + 1] == "108.000"
     assert placing[placing.index("--write") + 1] == routing[routing.index("--json") + 1] == "placed.json"
-    assert {"--no-pack", "--no-place", "--no-tmdriv"} <= set(routing)
+    assert {"--no-pack", "--no-place"} <= set(routing)
+    assert settings == [{"timing_driven": f"{0:032b}", "router": "router2"}]
 
 
 def test_what_is_too_slow_is_not_packed(monkeypatch):
