@@ -139,12 +139,12 @@ def route(board, design, *, seed, clocks):
                      folder=folder, what=what)
             files = {name: (Path(folder) / name).read_text() for name in ("report.json", "top.config", "routed.json")}
         report = json.loads(files["report.json"])
-        clocks = {_domain(net): net for net in report["fmax"]}
+        nets = {_domain(net): net for net in report["fmax"]}
         areas = areas_by_module(files["routed.json"], design)
         keep(configuration, gzip.compress(files["top.config"].encode(), compresslevel=6))
         keep(found, json.dumps({
-            "mhz": {domain: report["fmax"][net]["achieved"] for domain, net in clocks.items()},
-            "path": asdict(slowest(report, clocks["sync"])),
+            "mhz": {domain: report["fmax"][net]["achieved"] for domain, net in nets.items()},
+            "path": asdict(slowest(report, nets["sync"])),
             "areas": {path: asdict(area) for path, area in areas.items()}}).encode())
     kept = json.loads(found.read_text())
     return Routed(seed=seed, mhz=kept["mhz"], path=CriticalPath(**kept["path"]),

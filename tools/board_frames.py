@@ -33,12 +33,12 @@ def textured(config):
     return replace(SHADINGS["textured"](config), num_shaders=1)
 
 
-def _row(name, folder, config, digest, progress):
+def _row(name, folder, config, clock_mhz, digest, progress):
     loaded = TABLE3[name].load(folder)
     scene = plainly_lit(loaded.scene)
     compiled = CompiledScene(scene, fmt=config.fmt, stack_depth=config.stack_depth, index_width=config.index_width)
     image = replace(compiled.image(scene, eye=loaded.camera.eye, is_full=True), needs=config.shader)
-    frame = render_sdram(image, loaded.camera, *SIZE, config=config, progress=progress)
+    frame = render_sdram(image, loaded.camera, *SIZE, config=config, clock_mhz=clock_mhz, progress=progress)
     model = render_full(image, loaded.camera, *SIZE, config=config)
     report = frame.report
     return {"scene": name, "real": loaded.is_real, "size": list(SIZE), "cycles": report["cycles"],
@@ -88,16 +88,17 @@ def board_frames(board, scenes, only, docs):
         if not built:
             raise BadInput(f"{docs / 'results' / f'{board}.json'}: is not there; run dynrt build {board} --docs {docs} "
                            "first")
-        mhz = built["clocks"]["chip"]["worst_mhz"]
+        # The SDRAM's times are the more cycles the faster the clock: those of the bitstream's.
+        mhz, clock_mhz = (built["clocks"]["chip"][each] for each in ("worst_mhz", "needed_mhz"))
         check_places(docs / "board.md", _PARTS)
         path = docs / "results" / f"{board}-frames.json"
-        digest = chip_digest(config, latency="sdram")
+        digest = chip_digest(config, latency=f"SDRAM at {clock_mhz} MHz")
         rows = {row["scene"]: row for row in earlier_results(path).get("rows", []) if row["digest"] == digest}
         with progress_on(Console(stderr=True, highlight=False), "frames") as progress:
             for name in SCENES:
                 if name in (only or SCENES) and name not in rows:
                     progress(name)
-                    rows[name] = _row(name, scenes, config, digest, progress)
+                    rows[name] = _row(name, scenes, config, clock_mhz, digest, progress)
                 results = {"board": board, "config": repr(config),
                            "rows": [with_clock(rows[each], mhz) for each in SCENES if each in rows]}
                 write_texts({path: json_text(results), docs / "board.md": filled_page(docs / "board.md", _PARTS,

@@ -21,7 +21,8 @@ ROW = {"real": True, "size": [512, 384], "cycles": 5_000_000, "cycles_per_ray": 
 def docs(tmp_path):
     (tmp_path / "results").mkdir()
     (tmp_path / "board.md").write_text(PAGE)
-    (tmp_path / "results" / "ulx3s_85f.json").write_text(json.dumps({"clocks": {"chip": {"worst_mhz": 60.0}}}))
+    (tmp_path / "results" / "ulx3s_85f.json").write_text(
+        json.dumps({"clocks": {"chip": {"worst_mhz": 60.0, "needed_mhz": 50.0}}}))
     return tmp_path
 
 
@@ -44,7 +45,8 @@ def test_only_textures_and_the_boards_own_caches():
 def test_what_was_measured_of_this_chip_stays(monkeypatch, docs):
     asked = []
 
-    def row(name, folder, config, digest, progress):
+    def row(name, folder, config, clock_mhz, digest, progress):
+        assert clock_mhz == 50.0
         asked.append(name)
         return {"scene": name, "digest": digest, **ROW}
 
