@@ -155,7 +155,9 @@ class Pll(wiring.Component):
             outputs[f"o_{output}"] = ClockSignal(clock.domain)
             if clock.reset and clock.global_reset:
                 reset = Signal(name=f"{clock.domain}_reset")
-                m.submodules[f"{clock.domain}_reset"] = AsyncFFSynchronizer(~self.locked, reset, o_domain=clock.domain)
+                # The last has a copy, for logic (boards/global_reset.py): what both take over has settled.
+                m.submodules[f"{clock.domain}_reset"] = AsyncFFSynchronizer(~self.locked, reset, o_domain=clock.domain,
+                                                                            stages=3)
                 m.submodules[f"{clock.domain}_reset_buffer"] = Instance("DCCA", i_CLKI=reset,
                                                                         o_CLKO=ResetSignal(clock.domain))
             elif clock.reset:

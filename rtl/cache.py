@@ -116,9 +116,10 @@ class Cache(wiring.Component):
         # Answers that there are, and those that lookups and lines on their way may become.
         max_promised = _NUM_LOOKUPS + self._num_fetches
         promised = Signal(range(max_promised + 1))
-        claims, starts, vain, answered = Signal(), Signal(), Signal(), Signal()
+        claims, starts, vain, answered, left = Signal(), Signal(), Signal(), Signal(), Signal(2)
         m.d.comb += answered.eq(self.response.valid & self.response.ready)
-        m.d.sync += promised.eq(promised + (starts + claims) - (answered + vain))
+        # What is no longer promised is known late in a cycle; that there is room, a cycle later is soon enough.
+        m.d.sync += [left.eq(answered + vain), promised.eq(promised + (starts + claims) - left)]
 
         # Lookup: whoever has fetched goes first, and so finds the line, then one that waits, then a new one; nobody
         # while a line is written.

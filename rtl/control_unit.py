@@ -71,11 +71,16 @@ class ControlUnit(wiring.Component):
             self.record_address.ray.eq(token.ray),
             self.record_address.thread.eq(token.thread),
         ]
-        # Where a ray jumps to, and whether it does, which takes a while to find out: used a cycle later.
-        target, jumps = Signal.like(token.counter, reset_less=True), Signal(reset_less=True)
+        # Where a ray jumps to, and whether it does, which takes a while to find out: used two cycles later.
+        holds, always, may, jumps = self._holds(m), *(Signal(name=name, reset_less=True)
+                                                      for name in ("always", "may", "jumps"))
+        target, place = (Signal.like(token.counter, name=name, reset_less=True) for name in ("target", "place"))
         m.d.sync += [
-            jumps.eq((op == Op.CALL) | (op == Op.RETURN) | (op == Op.BRANCH) & self._holds(m)),
-            target.eq(Mux(op == Op.RETURN, self.i.x[0], self.i.instruction.target)),
+            always.eq((op == Op.CALL) | (op == Op.RETURN)),
+            may.eq(op == Op.BRANCH),
+            jumps.eq(always | may & holds),
+            place.eq(Mux(op == Op.RETURN, self.i.x[0], self.i.instruction.target)),
+            target.eq(place),
         ]
 
         stages = [Signal(data.StructLayout({"valid": 1, "op": Op, "part": 1, "result": self._result}),
@@ -105,7 +110,7 @@ class ControlUnit(wiring.Component):
         for earlier, later in pairwise(stages):
             m.d.sync += later.eq(earlier)
         with m.If(jumps):
-            m.d.sync += read.result.token.counter.eq(target)
+            m.d.sync += last.result.token.counter.eq(target)
         # What is read in memory is there with the last stage but one.
         if Op.HIT in self._ops:
             with m.If(read.op == Op.HIT):
@@ -115,7 +120,7 @@ class ControlUnit(wiring.Component):
         return m
 
     def _holds(self, m):
-        """Whether a branch's condition holds."""
+        """Whether a branch's condition holds, a cycle after the branch."""
         instruction = self.i.instruction
         raw = self.i.x[0]
         x = self._fmt(raw[:self._fmt.width])
@@ -131,11 +136,14 @@ class ControlUnit(wiring.Component):
             Condition.ZERO: zero, Condition.NOT_ZERO: ~zero, Condition.NONE: none, Condition.SOME: ~none,
             Condition.LESS: less, Condition.NOT_LESS: ~less, Condition.SET: bit, Condition.CLEAR: ~bit,
             Condition.MISS: miss, Condition.EMPTY: self.i.token.sp == 0}
-        holds = Signal()
-        with m.Switch(instruction.condition):
+        holds, asked = Signal(), Signal.like(instruction.condition, reset_less=True)
+        m.d.sync += asked.eq(instruction.condition)
+        with m.Switch(asked):
             for condition in sorted(self._conditions, key=lambda condition: condition.value):
+                value = Signal(name=condition.name.lower(), reset_less=True)
+                m.d.sync += value.eq(values[condition])
                 with m.Case(condition):
-                    m.d.comb += holds.eq(values[condition])
+                    m.d.comb += holds.eq(value)
         return holds
 
     def _hit(self, read):

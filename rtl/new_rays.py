@@ -1,6 +1,6 @@
 """Where the rays of a packet begin in the shader."""
 
-from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.hdl import Module, Signal, signed
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -55,25 +55,25 @@ class NewRays(wiring.Component):
         # So that who makes packets does not wait within a cycle for who waits for rays.
         m.submodules.packets = packets = Queue(self.primary.payload.shape(), depth=2)
         wiring.connect(m, wiring.flipped(self.primary), packets.i)
-        packet = packets.o.payload
-        done = Signal(PACKET_RAYS)
+        packet = Signal(self.primary.payload.shape(), reset_less=True)
         remaining = Signal(PACKET_RAYS)
         ray, others = lowest_ray(m, remaining)
         pending = Signal(range(_QUEUE_DEPTH + 1))
-        has_room, issue, is_first = Signal(), Signal(), Signal()
+        has_packet, has_room, issue, is_first, taken = Signal(), Signal(), Signal(), Signal(), Signal()
         m.d.comb += [
-            remaining.eq(packet.token.mask & ~done),
-            is_first.eq(~done.any()),
+            has_packet.eq(remaining.any()),
+            packets.o.ready.eq(~has_packet),
             has_room.eq(pending < _QUEUE_DEPTH),
-            self.begin.valid.eq(packets.o.valid & is_first & has_room),
+            self.begin.valid.eq(has_packet & is_first & has_room),
             self.begin.payload.thread.eq(packet.token.thread),
             self.begin.payload.mask.eq(packet.token.mask),
-            issue.eq(packets.o.valid & has_room & (~is_first | self.begin.ready)),
-            packets.o.ready.eq(issue & ~others.any()),
+            issue.eq(has_packet & has_room & (~is_first | self.begin.ready)),
         ]
-        m.d.sync += pending.eq(pending + issue - (self.ray.valid & self.ray.ready))
+        m.d.sync += [taken.eq(self.ray.valid & self.ray.ready), pending.eq(pending + issue - taken)]
         with m.If(issue):
-            m.d.sync += done.eq(Mux(others.any(), done | (1 << ray), 0))
+            m.d.sync += [remaining.eq(others), is_first.eq(0)]
+        with m.Elif(packets.o.valid & ~has_packet):
+            m.d.sync += [packet.eq(packets.o.payload), remaining.eq(packets.o.payload.token.mask), is_first.eq(1)]
 
         m.submodules.beside = beside = Delay(self._place, cycles=_CONVERT_LATENCY + 1)
         valid = Signal(_CONVERT_LATENCY + 2)

@@ -75,7 +75,8 @@ class PixelEncoder(wiring.Component):
             queue.i.payload.color.eq(Cat(blue, green, red)),
             self.idle.eq(~pending.any()),
         ]
-        m.d.sync += [valid[1:].eq(valid[:-1]),
-                     pending.eq(pending + self.ended.valid - (self.pixel.valid & self.pixel.ready))]
+        taken = Signal()
+        m.d.sync += [valid[1:].eq(valid[:-1]), taken.eq(self.pixel.valid & self.pixel.ready),
+                     pending.eq(pending + self.ended.valid - taken)]
         wiring.connect(m, queue.o, wiring.flipped(self.pixel))
         return m

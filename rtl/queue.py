@@ -1,13 +1,11 @@
 """Queues and the merging of streams."""
 
-from functools import reduce
-from operator import or_
-
 from amaranth.hdl import Assert, Cat, Module, Mux, Shape, Signal, Value
 from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from .block_memory import BlockMemory
+from .least_recent import selected
 
 __all__ = ["Merge", "Queue", "merged"]
 
@@ -181,8 +179,7 @@ class Merge(wiring.Component):
             with m.If(chosen[number]):
                 m.d.sync += turn.eq(Mux(self.o.ready, (number + 1) % self._num_inputs, number))
         # A bit of each of two inputs that may be chosen is a table, where a multiplexer by turns would be four.
-        payload = reduce(or_, (Value.cast(each.payload) & chosen[number].replicate(len(Value.cast(each.payload)))
-                               for number, each in enumerate(self.i)))
+        payload = selected([(chosen[number], Value.cast(each.payload)) for number, each in enumerate(self.i)])
         m.d.comb += [self.o.valid.eq(valid.any()), Value.cast(self.o.payload).eq(payload)]
         return m
 

@@ -36,6 +36,8 @@ def packet_layout(coord_width):
 class RayGeneration(wiring.Component):
     """Hands the packets of a picture to the pipelines, each to the next that has room for one.
 
+    The first is offered three cycles after ``start``; then one a cycle, a cycle without for each beyond the picture.
+
     Parameters
     ----------
     coord_width : int
@@ -68,40 +70,39 @@ class RayGeneration(wiring.Component):
         side = 2 << TILE_BITS
         tile_x, tile_y = Signal(self._coord_width + 1), Signal(self._coord_width + 1)
         number = Signal(2 * TILE_BITS)
-        x, y = Signal(self._coord_width + 1), Signal(self._coord_width + 1)
-        drawing = Signal()
-        inside = Signal()
-        advance = Signal()
-        packet = Signal(self._packet)
-        offered, issued, all_taken = Signal(), Signal(), Signal(init=1)
+        drawing, last_column, last_row = Signal(), Signal(), Signal()
+        x, y, placed, inside = Signal(self._coord_width + 1), Signal(self._coord_width + 1), Signal(), Signal()
+        packet, offered = Signal(self._packet), Signal()
+        place, offer, issued, all_taken = Signal(), Signal(), Signal(), Signal(init=1)
         m.d.comb += [
-            x.eq(tile_x + Cat(0, number[0::2])),
-            y.eq(tile_y + Cat(0, number[1::2])),
+            offer.eq(issued | ~offered),
+            place.eq(offer | ~placed),
             inside.eq((x < self.width) & (y < self.height)),
-            offered.eq(drawing & inside),
-            advance.eq(issued | drawing & ~inside),
-            packet.x.eq(x),
-            packet.y.eq(y),
-            self.ready.eq(~drawing & all_taken),
+            self.ready.eq(~drawing & ~placed & ~offered & all_taken),
         ]
-        for ray in range(PACKET_RAYS):
-            m.d.comb += packet.mask[ray].eq((x + (ray & 1) < self.width) & (y + (ray >> 1) < self.height))
         if self._num_pipelines == 1:
             target, = self.packet
             m.d.comb += [target.valid.eq(offered), target.payload.eq(packet), issued.eq(offered & target.ready)]
         else:
             self._distribute(m, packet, offered, issued, all_taken)
 
+        with m.If(offer):
+            m.d.sync += [offered.eq(placed & inside), packet.x.eq(x), packet.y.eq(y)]
+            for ray in range(PACKET_RAYS):
+                m.d.sync += packet.mask[ray].eq((x + (ray & 1) < self.width) & (y + (ray >> 1) < self.height))
+        with m.If(place):
+            m.d.sync += [placed.eq(drawing), x.eq(tile_x + Cat(0, number[0::2])), y.eq(tile_y + Cat(0, number[1::2]))]
+
+        # Read when a tile ends, long after it has begun.
+        m.d.sync += [last_column.eq(tile_x + side >= self.width), last_row.eq(tile_y + side >= self.height)]
         with m.If(self.start):
             m.d.sync += [drawing.eq(1), tile_x.eq(0), tile_y.eq(0), number.eq(0)]
-        with m.Elif(advance):
+        with m.Elif(drawing & place):
             m.d.sync += number.eq(number + 1)
             with m.If(number.all()):
                 m.d.sync += tile_x.eq(tile_x + side)
-                with m.If(tile_x + side >= self.width):
-                    m.d.sync += [tile_x.eq(0), tile_y.eq(tile_y + side)]
-                    with m.If(tile_y + side >= self.height):
-                        m.d.sync += drawing.eq(0)
+                with m.If(last_column):
+                    m.d.sync += [tile_x.eq(0), tile_y.eq(tile_y + side), drawing.eq(~last_row)]
         return m
 
     def _distribute(self, m, packet, offered, issued, all_taken):

@@ -1,12 +1,12 @@
 """From the shader's units back to the registers."""
 
-from amaranth.hdl import Cat, Const, Module, Signal
+from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from .layout import vector_layout
+from .least_recent import LeastRecent, selected
 from .microcode import lane_width
-from .queue import merged
 
 __all__ = ["WriteBack", "in_lanes", "result_layout"]
 
@@ -23,7 +23,11 @@ def in_lanes(fmt, *values):
 
 
 class WriteBack(wiring.Component):
-    """One result a clock: those of the transformation unit, which cannot wait, before others, these in turn.
+    """One result a clock: those of the transformation unit, which cannot wait, before others, of which whoever was
+    served least recently goes first.
+
+    Each input has a register, and who goes next is known a cycle before: so that no unit waits within a cycle for the
+    choice, nor the choice for a unit. Latency is 1 cycle for the transformation unit's, 2 for others.
 
     Parameters
     ----------
@@ -38,12 +42,13 @@ class WriteBack(wiring.Component):
     -------
     i : array of streams of results
     stepped : ``{"valid", "tag", "vector"}``, see :class:`~rtl.transformation.Transformation`
-    o : ``{"valid", "result"}``: the result, a cycle later
+    o : ``{"valid", "result"}``: the result
     """
 
     def __init__(self, *, fmt, num_inputs, tag, result):
         self._fmt = fmt
         self._result = result
+        self._num_inputs = num_inputs
         super().__init__({
             "i": In(stream.Signature(result)).array(num_inputs),
             "stepped": In(data.StructLayout({"valid": 1, "tag": tag, "vector": vector_layout(fmt)})),
@@ -52,10 +57,25 @@ class WriteBack(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        taken = merged(m, "merge", [wiring.flipped(source) for source in self.i])
+        num_inputs = self._num_inputs
+        held = [Signal(self._result, name=f"held{number}", reset_less=True) for number in range(num_inputs)]
+        has, will_have, goes, leaves = (Signal(num_inputs) for _ in range(4))
+        m.submodules.turns = turns = LeastRecent(num_bidders=num_inputs)
+        m.d.comb += [leaves.eq(Mux(self.stepped.valid, 0, goes)), turns.bid.eq(will_have)]
+        m.d.sync += has.eq(will_have)
+        for number, source in enumerate(self.i):
+            m.d.comb += [source.ready.eq(~has[number] | leaves[number]),
+                         will_have[number].eq(has[number] & ~leaves[number] | source.valid)]
+            with m.If(source.ready):
+                m.d.sync += held[number].eq(source.payload)
+        with m.If(~self.stepped.valid | ~goes.any()):
+            m.d.comb += turns.served.eq(turns.grant)
+            m.d.sync += goes.eq(turns.grant)
+
         result, valid = Signal(self._result, reset_less=True), Signal()
-        m.d.comb += [taken.ready.eq(~self.stepped.valid), self.o.valid.eq(valid), self.o.result.eq(result)]
-        m.d.sync += [result.eq(taken.payload), valid.eq(taken.valid | self.stepped.valid)]
+        m.d.comb += [self.o.valid.eq(valid), self.o.result.eq(result)]
+        m.d.sync += [result.eq(selected([(goes[number], each.as_value()) for number, each in enumerate(held)])),
+                     valid.eq(goes.any() | self.stepped.valid)]
         with m.If(self.stepped.valid):
             tag, vector = self.stepped.tag, self.stepped.vector
             m.d.sync += [result.token.eq(tag.token), result.last.eq(1), result.dst.eq(tag.dst),

@@ -170,7 +170,8 @@ class Shader(wiring.Component):
         begun = Signal(name=f"{name}_begun")
         pending = Signal(range(depth + 1), name=f"{name}_pending")
         m.d.comb += [queue.i.payload.eq(result), queue.i.valid.eq(valid)]
-        m.d.sync += pending.eq(pending + begun - (queue.o.valid & queue.o.ready))
+        taken = Signal(name=f"{name}_taken")
+        m.d.sync += [taken.eq(queue.o.valid & queue.o.ready), pending.eq(pending + begun - taken)]
         has_room = Signal(name=f"{name}_has_room")
         m.d.sync += has_room.eq(pending + self._fetch.under_way < depth - 2)
         rooms.append(has_room)

@@ -146,7 +146,7 @@ class Texture(wiring.Component):
         request = self.request.payload
         m.submodules.place = place = TexturePlace(fmt=self._fmt)
         under_way = Signal(range(depth + 1))
-        takes, is_second, accepts, leaves = Signal(), Signal(), Signal(), Signal()
+        takes, is_second, accepts, leaves, left = Signal(), Signal(), Signal(), Signal(), Signal()
         is_there = Signal(place.latency)
         x = Signal(PLACE_WIDTH, reset_less=True)
         m.d.comb += [
@@ -166,7 +166,8 @@ class Texture(wiring.Component):
             places.i.valid.eq(is_there[-1]),
         ]
         m.d.sync += [
-            under_way.eq(under_way + accepts - leaves),
+            left.eq(leaves),
+            under_way.eq(under_way + accepts - left),
             is_there.eq(Cat(accepts, is_there)),
             x.eq(place.place),
         ]

@@ -16,7 +16,7 @@ from .transformation_jobs import Kind, TransformationJobs
 __all__ = ["Transformation", "affine_map"]
 
 #: Of a primary ray's place on the screen
-_CONVERT_LATENCY = 4
+_CONVERT_LATENCY = 5
 
 
 class Transformation(wiring.Component):

@@ -97,7 +97,7 @@ class WriteOut(wiring.Component):
         take = Signal()
         last = Signal()
         under_way = Signal(range(depth + 1))
-        moves, outside = Signal(), Signal()
+        moves, outside, moved, left = Signal(), Signal(), Signal(), Signal()
         token = self.packet.payload
         m.d.comb += [
             take.eq(self.packet.valid & (under_way < depth)),
@@ -109,7 +109,8 @@ class WriteOut(wiring.Component):
             self.record_address.ray.eq(ray),
             self.record_address.thread.eq(token.thread),
         ]
-        m.d.sync += under_way.eq(under_way + take - moves - outside)
+        # Whether a pixel moves is known late, from whoever takes it; that there is room, a cycle later is soon enough.
+        m.d.sync += [moved.eq(moves), left.eq(outside), under_way.eq(under_way + take - moved - left)]
         with m.If(take):
             m.d.sync += ray.eq(ray + 1)
 

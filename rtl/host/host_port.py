@@ -13,7 +13,7 @@ from .register_file import RegisterFile
 __all__ = ["HostPort", "host_members"]
 
 #: More than from a frame's words to whether it is refused
-_CHECK_CYCLES = 4
+_CHECK_CYCLES = 5
 
 
 def host_members(*, word_width, num_registers, num_values):
@@ -109,7 +109,7 @@ class HostPort(wiring.Component):
         # The payload's first two words
         first, second = Signal(32, reset_less=True), Signal(32, reset_less=True)
         reason, doubled = Signal(8, reset_less=True), Signal(reset_less=True)
-        place, left = Signal(range(MAX_PAYLOAD + 1)), Signal(range(MAX_WORDS + 1))
+        place, left, is_last = Signal(range(MAX_PAYLOAD + 1)), Signal(range(MAX_WORDS + 1)), Signal()
         number = Signal(range(self._num_readable))
         address = Signal(len(self.request.payload), reset_less=True)
         word = Signal(32, reset_less=True)
@@ -131,6 +131,8 @@ class HostPort(wiring.Component):
 
         finished = Signal()
         m.d.comb += receiver.frame.ready.eq(finished)
+        # Whether the last is due is known before it is.
+        count_down = [left.eq(left - 1), is_last.eq(left == 2)]
         m.d.comb += [
             self.write.payload.address.eq(address), self.write.payload.word.eq(receiver.word),
             self.write.payload.mask.eq(-1), self.request.payload.eq(address),
@@ -147,17 +149,17 @@ class HostPort(wiring.Component):
                 m.d.sync += first.eq(receiver.word)
                 m.next = "second"
             with m.State("second"):
-                m.d.sync += [second.eq(receiver.word), left.eq(_CHECK_CYCLES)]
+                m.d.sync += [second.eq(receiver.word), left.eq(_CHECK_CYCLES), is_last.eq(0)]
                 m.next = "judge"
             with m.State("judge"):
-                m.d.sync += left.eq(left - 1)
-                with m.If(left == 0):
+                m.d.sync += count_down
+                with m.If(is_last):
                     m.next = "check"
             with m.State("check"):
                 # An upload's words come from the second on.
                 m.d.comb += [receiver.reading.eq(1), receiver.address.eq(1)]
                 m.d.sync += [doubled.eq(0), place.eq(2), address.eq(first), number.eq(first), left.eq(second),
-                             reason.eq(refusal)]
+                             is_last.eq(second == 1), reason.eq(refusal)]
                 m.next = "decide"
                 with m.If(~frame.good):
                     m.d.sync += [counts[LinkCount.DAMAGED].eq(counts[LinkCount.DAMAGED] + 1),
@@ -188,7 +190,7 @@ class HostPort(wiring.Component):
                         with m.Case(Command.OPEN):
                             m.next = "open"
                         with m.Case(Command.WRITE):
-                            m.d.sync += left.eq(num_words - 1)
+                            m.d.sync += [left.eq(num_words - 1), is_last.eq(num_words == 2)]
                             with m.If(~doubled):
                                 m.next = "write"
                         with m.Case(Command.READ):
@@ -204,8 +206,8 @@ class HostPort(wiring.Component):
                 m.d.comb += self.write.valid.eq(1)
                 with m.If(self.write.ready):
                     m.d.comb += [receiver.reading.eq(1), receiver.address.eq(place)]
-                    m.d.sync += [place.eq(place + 1), address.eq(address + 1), left.eq(left - 1)]
-                    with m.If(left == 1):
+                    m.d.sync += [place.eq(place + 1), address.eq(address + 1), *count_down]
+                    with m.If(is_last):
                         m.next = "settle"
             with m.State("settle"):
                 # ``written`` is of the words taken before.
@@ -229,11 +231,11 @@ class HostPort(wiring.Component):
                     m.next = "word"
             with m.State("word"):
                 m.d.comb += [answers.i.valid.eq(1), answers.i.payload.word.eq(word),
-                             answers.i.payload.last.eq(left == 1)]
+                             answers.i.payload.last.eq(is_last)]
                 with m.If(answers.i.ready):
-                    m.d.sync += left.eq(left - 1)
+                    m.d.sync += count_down
                     m.next = "request"
-                    with m.If(left == 1):
+                    with m.If(is_last):
                         m.d.comb += finished.eq(1)
                         m.next = "idle"
 
@@ -248,25 +250,25 @@ class HostPort(wiring.Component):
                 m.next = "value"
             with m.State("value"):
                 m.d.comb += [answers.i.valid.eq(1), answers.i.payload.word.eq(file.value),
-                             answers.i.payload.last.eq(left == 1)]
+                             answers.i.payload.last.eq(is_last)]
                 with m.If(answers.i.ready):
-                    m.d.sync += [left.eq(left - 1), number.eq(number + 1)]
+                    m.d.sync += [*count_down, number.eq(number + 1)]
                     m.next = "fetch"
-                    with m.If(left == 1):
+                    with m.If(is_last):
                         m.d.comb += finished.eq(1)
                         m.next = "idle"
 
             with m.State("open"):
                 answer(m, kind=Const(Command.OPEN | ACKNOWLEDGED, 8), length=len(opening))
-                m.d.sync += place.eq(0)
+                m.d.sync += [place.eq(0), is_last.eq(0)]
                 with m.If(answers.i.ready):
                     m.next = "opening"
             with m.State("opening"):
                 m.d.comb += [answers.i.valid.eq(1), answers.i.payload.word.eq(Array(opening)[place]),
-                             answers.i.payload.last.eq(place == len(opening) - 1)]
+                             answers.i.payload.last.eq(is_last)]
                 with m.If(answers.i.ready):
-                    m.d.sync += place.eq(place + 1)
-                    with m.If(answers.i.payload.last):
+                    m.d.sync += [place.eq(place + 1), is_last.eq(place == len(opening) - 2)]
+                    with m.If(is_last):
                         m.d.comb += finished.eq(1)
                         m.next = "idle"
 
@@ -310,8 +312,10 @@ class HostPort(wiring.Component):
             with m.If(condition):
                 m.d.sync += refusal.eq(reason)
 
+        kind = Signal.like(frame.type, reset_less=True)
         # What is said last counts.
-        with m.Switch(frame.type):
+        m.d.sync += kind.eq(frame.type)
+        with m.Switch(kind):
             with m.Case(Command.OPEN):
                 refuse(~has_one, Reason.LENGTH)
             with m.Case(Command.WRITE):

@@ -4,9 +4,8 @@ from amaranth.hdl import Assert, Cat, Module, Mux, Signal
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from ..least_recent import LeastRecent, selected
 from .commands import access_layout
-from .controller import selected
-from .least_recent import LeastRecent
 
 __all__ = ["Arbiter"]
 

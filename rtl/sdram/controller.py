@@ -6,13 +6,13 @@ from amaranth.lib.wiring import In, Out
 
 from fpu import Delay
 
+from ..least_recent import LeastRecent, selected
 from .bank import Bank, column_layout
 from .commands import Command, access_layout, answer_layout, pins_signature
 from .direction import Direction
-from .least_recent import LeastRecent
 from .upkeep import Upkeep
 
-__all__ = ["Controller", "selected", "store_layout"]
+__all__ = ["Controller", "store_layout"]
 
 #: Cycles from a word's command at the outputs of the banks to the pins.
 _TO_PINS = 2
@@ -23,14 +23,6 @@ def store_layout():
     return data.StructLayout({"word": 32, "mask": 4})
 
 
-def selected(choices):
-    """Of pairs of a condition and a value the one whose condition holds; zero if none does."""
-    result = Const(0)
-    for condition, value in choices:
-        result = result | (value & condition.replicate(len(value)))
-    return result
-
-
 class Controller(wiring.Component):
     """Does the accesses of each bank in order, and those of different banks as it suits the chip.
 
@@ -38,7 +30,7 @@ class Controller(wiring.Component):
     move, rows of the others are closed and opened. Each word takes a column command and two cycles, 32 bits in bursts
     of two columns, so that every other cycle is free for a row's command and words can follow each other without a
     gap. An access that has begun goes on before others in open rows; the bank served least recently comes next. No
-    access waits for ever: see :class:`~.least_recent.LeastRecent`, :class:`~.direction.Direction` and
+    access waits for ever: see :class:`~rtl.least_recent.LeastRecent`, :class:`~.direction.Direction` and
     :class:`~.upkeep.Upkeep`.
 
     Throughput is a word in two cycles; for latency see :class:`~.memory.SdramMemory`.

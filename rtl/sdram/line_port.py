@@ -4,6 +4,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from ..queue import Queue
 from .commands import MAX_WORDS, PLACE_WIDTH
 
 __all__ = ["BASE_WORDS", "LinePort", "piece_layout"]
@@ -61,17 +62,21 @@ class LinePort(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         width = self._chip.word_width
-        offset, has_offset, takes_offset = Signal(width, reset_less=True), Signal(), Signal()
+        # Who asks does not wait within a cycle for who takes.
+        m.submodules.offsets = offsets = Queue(width, depth=2)
+        takes_offset = Signal()
         address, has_address, takes_address = Signal(width, reset_less=True), Signal(), Signal()
         multiple = Signal(width)
         # Not as a product, for which there would be a multiplier.
         m.d.comb += multiple.eq(sum(self.request.payload << bit for bit in range(PLACE_WIDTH + 1)
                                     if self._words >> bit & 1))
-        m.d.comb += [self.request.ready.eq(~has_offset | takes_offset), takes_offset.eq(~has_address | takes_address)]
-        with m.If(self.request.ready):
-            m.d.sync += [has_offset.eq(self.request.valid), offset.eq(multiple)]
+        m.d.comb += [
+            offsets.i.payload.eq(multiple), offsets.i.valid.eq(self.request.valid),
+            self.request.ready.eq(offsets.i.ready),
+            takes_offset.eq(~has_address | takes_address), offsets.o.ready.eq(takes_offset),
+        ]
         with m.If(takes_offset):
-            m.d.sync += [has_address.eq(has_offset), address.eq((self.base << PLACE_WIDTH) + offset)]
+            m.d.sync += [has_address.eq(offsets.o.valid), address.eq((self.base << PLACE_WIDTH) + offsets.o.payload)]
         # Aligned lines lie in one row.
         if self._words.bit_count() == 1:
             m.d.comb += [self.piece.valid.eq(has_address), takes_address.eq(self.piece.ready),

@@ -1,10 +1,10 @@
 """One SDRAM for all that a chip reads and writes."""
 
-from amaranth.hdl import Module, Signal
+from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from ..queue import merged
+from ..queue import Queue, merged
 from .arbiter import Arbiter
 from .commands import MAX_WORDS, PLACE_WIDTH, pins_signature
 from .controller import Controller
@@ -110,8 +110,12 @@ class SdramMemory(wiring.Component):
             m.d.comb += arbiter.urgent[number].eq(display.urgent)
         if self._num_writers:
             m.submodules.writes = writes = WritePort(chip=chip)
-            words = merged(m, "writers", [wiring.flipped(port) for port in self.write])
-            wiring.connect(m, words, writes.i)
+            # So that writers do not wait for each other within a cycle.
+            queues = [Queue(write_layout(chip), depth=2) for _ in self.write]
+            for number, (port, queue) in enumerate(zip(self.write, queues, strict=True)):
+                m.submodules[f"write_queue{number}"] = queue
+                wiring.connect(m, wiring.flipped(port), queue.i)
+            wiring.connect(m, merged(m, "writers", [queue.o for queue in queues]), writes.i)
             source = arbiter.source[-1]
             m.d.comb += [
                 source.valid.eq(writes.request.valid),
@@ -123,7 +127,7 @@ class SdramMemory(wiring.Component):
                 writes.fetch.valid.eq(controller.fetch.valid),
                 writes.fetch.tag.eq(controller.fetch.tag),
                 controller.store.eq(writes.store),
-                self.written.eq(writes.idle),
+                self.written.eq(writes.idle & ~Cat(queue.o.valid for queue in queues).any()),
             ]
         return m
 

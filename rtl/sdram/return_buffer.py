@@ -6,8 +6,8 @@ from amaranth.lib.wiring import In, Out
 from amaranth.utils import ceil_log2
 
 from ..block_memory import BlockMemory
+from ..least_recent import LeastRecent, selected
 from .commands import MAX_WORDS, PLACE_WIDTH, answer_layout
-from .least_recent import LeastRecent
 
 __all__ = ["ReturnBuffer", "tag_layout"]
 
@@ -46,7 +46,7 @@ class ReturnBuffer(wiring.Component):
         self._tag = tag_layout(num_ports=len(words), num_slots=max(slots))
         asked = data.StructLayout({"valid": 1, "second": 1, "split": 1})
         super().__init__({
-            "has_slot": Out(1).array(len(words)),
+            "has_slot": Out(1, init=1).array(len(words)),
             "slot": Out(range(max(slots))).array(len(words)),
             "asked": In(asked).array(len(words)),
             "answer": In(answer_layout(tag_width=self._tag.size)),
@@ -77,10 +77,11 @@ class ReturnBuffer(wiring.Component):
 
         m.submodules.turns = turns = LeastRecent(num_bidders=num_ports)
         reading, started, chosen = Signal(), Signal(), Signal(num_ports)
-        left = Signal(PLACE_WIDTH)
+        # A line's words that are left, and whether it is the last one's turn, which is known before.
+        left, is_last = Signal(PLACE_WIDTH), Signal()
         place, number, slot = Signal(PLACE_WIDTH), Signal(range(num_ports)), Signal(range(num_slots))
         m.d.comb += [
-            ends.eq(reading & (left == 0)),
+            ends.eq(reading & is_last),
             # Whose line has just been started has not seen yet whether there is another one.
             turns.bid.eq(is_done & ~chosen & ~Mux(started, reader, 0)),
             turns.served.eq(starts),
@@ -88,16 +89,23 @@ class ReturnBuffer(wiring.Component):
             storage.address.eq(Cat(place, slot if num_slots > 1 else Const(0, 0), number)),
             storage.reading.eq(reading),
         ]
-        m.d.sync += [started.eq(starts.any()), place.eq(place + 1), left.eq(left - 1)]
+        m.d.sync += [started.eq(starts.any()), place.eq(place + 1), left.eq(left - 1),
+                     is_last.eq(left == 1)]
         with m.If(~chosen.any() | starts.any()):
             m.d.sync += chosen.eq(turns.grant)
         with m.If(starts.any()):
-            m.d.sync += [reading.eq(1), reader.eq(starts), place.eq(0)]
+            m.d.sync += [
+                reading.eq(1),
+                reader.eq(starts),
+                place.eq(0),
+                is_last.eq(Cat(chosen[port] for port, words in enumerate(self._words) if words == 1).any()),
+                left.eq(selected([(chosen[port], Const(words - 1, PLACE_WIDTH))
+                                  for port, words in enumerate(self._words)])),
+                number.eq(selected([(chosen[port], Const(port, len(number))) for port in range(num_ports)])),
+                slot.eq(selected([(chosen[port], first) for port, first in enumerate(firsts)])),
+            ]
         with m.Elif(ends):
             m.d.sync += reading.eq(0)
-        for port, words in enumerate(self._words):
-            with m.If(starts[port]):
-                m.d.sync += [left.eq(words - 1), number.eq(port), slot.eq(firsts[port])]
 
         read = [Mux(reading, reader, 0)]
         for cycle in range(storage.latency):
@@ -117,9 +125,10 @@ class ReturnBuffer(wiring.Component):
         m.d.comb += [
             begins.eq(asked.valid & ~asked.second),
             whole.eq(asked.valid & (asked.second | ~asked.split)),
-            self.has_slot[port].eq(taken != num_slots),
         ]
-        m.d.sync += [taken.eq(taken + begins - ends), waiting.eq(waiting + begins - starts),
+        # One that leaves now is free a cycle later.
+        m.d.sync += [self.has_slot[port].eq(taken + begins != num_slots), taken.eq(taken + begins - ends),
+                     waiting.eq(waiting + begins - starts),
                      is_done[port].eq((waiting != 0) & ~missing[first].any())]
         for slot in range(num_slots):
             for piece in range(2):

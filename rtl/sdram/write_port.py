@@ -62,10 +62,10 @@ class WritePort(wiring.Component):
         m.submodules.words = words = memory.Memory(shape=store_layout(), depth=num_slots, init=[])
         write, read = words.write_port(), words.read_port(domain="comb")
         following, first = Signal(SLOT_WIDTH), Signal(SLOT_WIDTH)
-        busy = Signal(num_slots)
+        busy, has_slot = Signal(num_slots), Signal(init=1)
         accepted = Signal()
         m.d.comb += [
-            self.i.ready.eq(~busy.bit_select(following, 1)),
+            self.i.ready.eq(has_slot),
             accepted.eq(self.i.valid & self.i.ready),
             addresses.i.valid.eq(accepted),
             addresses.i.payload.eq(self.i.payload.address),
@@ -74,7 +74,8 @@ class WritePort(wiring.Component):
             read.addr.eq(self.fetch.tag),
             self.idle.eq(~busy.any()),
         ]
-        m.d.sync += self.store.eq(read.data)
+        # A slot that is fetched now is found a cycle later.
+        m.d.sync += [has_slot.eq(~busy.bit_select((following + accepted)[:SLOT_WIDTH], 1)), self.store.eq(read.data)]
         with m.If(self.fetch.valid):
             m.d.sync += busy.bit_select(self.fetch.tag, 1).eq(0)
         with m.If(accepted):

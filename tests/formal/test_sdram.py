@@ -6,10 +6,10 @@ from math import ceil
 import pytest
 from amaranth.hdl import Assert, Assume, Cat, Const, Module, Mux, Signal
 
+from rtl.least_recent import LeastRecent
 from rtl.sdram.arbiter import Arbiter
 from rtl.sdram.bank import Bank
 from rtl.sdram.commands import Command
-from rtl.sdram.least_recent import LeastRecent
 from rtl.sdram.timing import SLOWEST, SdramTiming
 from rtl.sdram.upkeep import Upkeep
 from tests.formal.prove import Refuted, prove

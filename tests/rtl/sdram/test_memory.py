@@ -16,7 +16,10 @@ _NUM_WRITES = 40
 
 
 class Reference:
-    """The chip's words, and what is under way: nobody reads what is being written, and nobody writes what is read."""
+    """The chip's words, and what is under way.
+
+    Nobody reads what is being written, and nobody writes what is read, or what another one is writing.
+    """
 
     def __init__(self, rng):
         self._rng = rng
@@ -34,7 +37,7 @@ class Reference:
 
     def begin(self, addresses):
         """The words of a line that is going to be read, or None if it must not be now."""
-        if any(address in self._written for address in addresses):
+        if any(address == written for address in addresses for _, written in self._written):
             return None
         for address in addresses:
             self._read[address] = self._read.get(address, 0) + 1
@@ -43,12 +46,12 @@ class Reference:
     def end(self, address):
         self._read[address] -= 1
 
-    def write(self, address, word, mask):
-        if self._read.get(address):
+    def write(self, writer, address, word, mask):
+        if self._read.get(address) or any(address == written and other != writer for other, written in self._written):
             return False
         keep = sum(0xFF << 8 * byte for byte in range(4) if not mask >> byte & 1)
         self.words[address] = self.words.get(address, 0) & keep | word & ~keep
-        self._written.append(address)
+        self._written.append((writer, address))
         return True
 
 
@@ -95,7 +98,7 @@ def test_every_port_gets_its_words_in_order(seed, readers, num_writers, display,
             for number in range(num_writers):
                 if writes_left[number] and not writes[number] and rng.random() < 0.3:
                     address, word, mask = rng.randrange(span), rng.getrandbits(32), rng.choice([15, 15, 3, 9, 0])
-                    if reference.write(address, word, mask):
+                    if reference.write(number, address, word, mask):
                         writes[number].append({"address": address, "word": word, "mask": mask})
                         writes_left[number] -= 1
             await ctx.tick()

@@ -1,10 +1,18 @@
-"""Who goes first: whoever has waited longest since it was last served."""
+"""Who goes first: whoever has waited longest since it was last served; and what it brings."""
 
-from amaranth.hdl import Cat, Module, Signal
+from amaranth.hdl import Cat, Const, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-__all__ = ["LeastRecent"]
+__all__ = ["LeastRecent", "selected"]
+
+
+def selected(choices):
+    """Of pairs of a condition and a value the one whose condition holds; zero if none does."""
+    result = Const(0)
+    for condition, value in choices:
+        result = result | (value & condition.replicate(len(value)))
+    return result
 
 
 class LeastRecent(wiring.Component):
