@@ -44,8 +44,6 @@ class Cache(wiring.Component):
         Lines that may be on their way at a time.
     num_waiting : int
         Requests that may be in the cache at a time (the caller's promise).
-    answers_in_block : bool
-        Whether answers wait in block RAM; else in distributed memories, six tables for four bits.
 
     Members
     -------
@@ -64,14 +62,13 @@ class Cache(wiring.Component):
     """
 
     def __init__(self, *, item_width, payload_shape, index_width, num_lines, line_items=1, num_fetches=4,
-                 num_waiting, answers_in_block=False):
+                 num_waiting):
         self._item_width = item_width
         self._item_words = -(-item_width // WORD_WIDTH)
         self._num_lines = num_lines
         self._line_items = line_items
         self._num_fetches = num_fetches
         self._num_waiting = num_waiting
-        self._answers_in_block = answers_in_block
         if self.line_words < 2:
             raise ValueError("A line of a cache has a single word; it must have 2 or more")
         self._slot_bits = exact_log2(num_lines)
@@ -153,8 +150,7 @@ class Cache(wiring.Component):
             item.eq(self._select_item(lines.data, compared.index)),
         ]
 
-        m.submodules.answers = answers = Queue(self._response_layout, depth=max_promised, always_ready=True,
-                                               block=self._answers_in_block)
+        m.submodules.answers = answers = Queue(self._response_layout, depth=max_promised, always_ready=True)
         waiting_layout = data.StructLayout({"request": request_layout, "in_vain": 1})
         m.submodules.waiting = waiting = Queue(waiting_layout, depth=self._num_waiting, always_ready=True)
         wiring.connect(m, answers.o, wiring.flipped(self.response))

@@ -263,8 +263,7 @@ class DynRTP(wiring.Component):
         config = self.config
         num_rays = PACKET_RAYS * config.num_threads
         records = self._cache(m, "shading", item_width=12 * lane_width(config.fmt), num_lines=config.shading_lines,
-                              payload_shape=shader.load.payload.payload.shape(), num_waiting=num_rays,
-                              answers_in_block=True)
+                              payload_shape=shader.load.payload.payload.shape(), num_waiting=num_rays)
         caches["shading"] = records
         if "textures" in cache_names(config):
             m.submodules.texture = texture = Texture(

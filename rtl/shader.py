@@ -1,6 +1,6 @@
 """The shader: makes rays, and colours of what they hit, by a program (paper §2.2, §3.2)."""
 
-from amaranth.hdl import Cat, Const, Module, Shape, Signal
+from amaranth.hdl import Cat, Const, Module, Signal
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -26,8 +26,6 @@ __all__ = ["Shader"]
 #: Operations of the colour unit.
 _COLOR_OPS = {Op.ROOT, Op.CUT, Op.COLOR_MULTIPLY, Op.COLOR_ADD, Op.COLOR_SUBTRACT, Op.DECODE, Op.BYTES, Op.OFFSET}
 _QUEUE_DEPTH = 16
-#: Bits from which on a queue for instructions is in block RAM: four of them at least, in place of 200 tables or more
-_WIDE = 144
 
 
 class Shader(wiring.Component):
@@ -154,7 +152,7 @@ class Shader(wiring.Component):
 
         Whether it has is looked up a cycle before, in which one more may have been taken up.
         """
-        queue = Queue(shape, depth=_QUEUE_DEPTH, always_ready=True, block=Shape.cast(shape).width >= _WIDE)
+        queue = Queue(shape, depth=_QUEUE_DEPTH, always_ready=True)
         m.submodules[f"{name}_queue"] = queue
         m.d.comb += queue.i.valid.eq(when)
         has_room = Signal(name=f"{name}_has_room")

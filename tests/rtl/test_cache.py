@@ -8,12 +8,11 @@ from rtl.cache import Cache
 from tests.bench import simulate
 
 
-def run_cache(*, seed, num_lines, line_items, item_width, num_fetches, gap, latency, indices, answers_in_block=False):
+def run_cache(*, seed, num_lines, line_items, item_width, num_fetches, gap, latency, indices):
     rng = random.Random(seed)
     num_waiting = 7
     dut = Cache(item_width=item_width, payload_shape=16, index_width=12, num_lines=num_lines,
-                line_items=line_items, num_fetches=num_fetches, num_waiting=num_waiting,
-                answers_in_block=answers_in_block)
+                line_items=line_items, num_fetches=num_fetches, num_waiting=num_waiting)
     item_words = -(-item_width // 32)
     words = [rng.getrandbits(32) for _ in range(4096 * item_words)]
     num_requests = len(indices)
@@ -79,15 +78,14 @@ def run_cache(*, seed, num_lines, line_items, item_width, num_fetches, gap, late
     return events
 
 
-@pytest.mark.parametrize("answers_in_block", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("line_items", "item_width"), [(1, 33), (4, 32), (2, 64), (1, 288), (2, 24)])
-def test_every_request_is_answered_once_and_right(seed, line_items, item_width, answers_in_block):
+def test_every_request_is_answered_once_and_right(seed, line_items, item_width):
     # Near ones share lines; far ones, a multiple of the cache's size apart, evict each other.
     rng = random.Random(seed)
     indices = [rng.randrange(40) * rng.choice((1, 1, 8 * line_items)) for _ in range(300)]
     run_cache(seed=seed, num_lines=8, line_items=line_items, item_width=item_width, num_fetches=1 + seed,
-              gap=0.3 * (seed % 3), latency=1 + 7 * seed, indices=indices, answers_in_block=answers_in_block)
+              gap=0.3 * (seed % 3), latency=1 + 7 * seed, indices=indices)
 
 
 def test_lines_are_kept():
