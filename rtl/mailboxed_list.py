@@ -97,22 +97,25 @@ class MailboxedList(wiring.Component):
         # A list goes on before another is begun: what is in the caches is used first.
         m.submodules.going_on = going_on = Merge(self._stop, num_inputs=len(stops) + 1)
         m.submodules.ended = ended = Queue(self._token, depth=2)
+        # So that those that go on do not wait within a cycle for where they go.
+        m.submodules.gone_on = gone_on = Queue(self._stop, depth=2)
+        wiring.connect(m, going_on.o, gone_on.i)
         for source, target in zip(stops, going_on.i, strict=False):
             wiring.connect(m, source, target)
-        leaf, place = going_on.i[-1], going_on.o.payload
+        leaf, place = going_on.i[-1], gone_on.o.payload
         wiring.connect(m, ended.o, wiring.flipped(self.pop))
         m.d.comb += [
             leaf.valid.eq(self.leaf.valid),
             leaf.payload.token.eq(self.leaf.payload.token),
             leaf.payload.list.eq(self.leaf.payload.list),
             self.leaf.ready.eq(leaf.ready),
-            self.fetch.valid.eq(going_on.o.valid & ~place.last),
+            self.fetch.valid.eq(gone_on.o.valid & ~place.last),
             self.fetch.payload.index.eq(place.list),
             self.fetch.payload.payload.token.eq(place.token),
             self.fetch.payload.payload.list.eq(place.list),
-            ended.i.valid.eq(going_on.o.valid & place.last),
+            ended.i.valid.eq(gone_on.o.valid & place.last),
             ended.i.payload.eq(place.token),
-            going_on.o.ready.eq(Mux(place.last, ended.i.ready, self.fetch.ready)),
+            gone_on.o.ready.eq(Mux(place.last, ended.i.ready, self.fetch.ready)),
         ]
 
     def _come_back(self, m, returned):

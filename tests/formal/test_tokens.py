@@ -137,7 +137,7 @@ def list_proof(*, patience):
 @pytest.mark.parametrize(("proof", "parameters", "patience", "cycles"), [
     (stack_proof, dict(stack_depth=1), 7, 13),
     (stack_proof, dict(stack_depth=2), 14, 18),
-    (list_proof, dict(), 6, 15),
+    (list_proof, dict(), 7, 16),
 ])
 def test_no_token_is_lost_or_doubled(tmp_path, proof, parameters, patience, cycles):
     module, ports = proof(**parameters, patience=patience)
