@@ -13,7 +13,7 @@ from .device import DEVICES
 __all__ = ["ULX3S_25F", "ULX3S_45F", "ULX3S_85F"]
 
 ULX3S_85F = Board(name="ulx3s_85f", title="ULX3S with LFE5U-85F", platform=ULX3S_85F_Platform,
-                  device=DEVICES["LFE5U-85F"], oscillator_mhz=25, clock_mhz=64, config=FULL,
+                  device=DEVICES["LFE5U-85F"], oscillator_mhz=25, clock_mhz=64.0625, config=FULL,
                   mode=XGA_REDUCED)
 ULX3S_45F = replace(ULX3S_85F, name="ulx3s_45f", title="ULX3S with LFE5U-45F", platform=ULX3S_45F_Platform,
                     device=DEVICES["LFE5U-45F"], clock_mhz=70, config=SIMPLE)
