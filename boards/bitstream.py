@@ -25,7 +25,7 @@ _CLOCK = re.compile(r"(\$glbnet\$)?(\w+\.)*(?P<domain>\w+?)?_?clk")
 #: By how much the clocks that are worked for are above those that are wanted. Where a clock is met, nextpnr takes every
 #: path for as critical as the slowest, and what is critical gives way to nothing; where it is missed by far, most paths
 #: are. The chip's is to be missed by a little, for its slowest paths to go first, and others' for certain, as there is
-#: no more to win: docs/decisions/014.
+#: no more to win: docs/decisions/015.
 _PRESSURE, _PRESSURE_OF_OTHERS = 1.125, 2.25
 #: By how many places router2 leaves the box of a net's pins, at any time: with 3, its own choice, there are nets in the
 #: midst of others that cannot go round. No option of nextpnr says so, but a design may bring settings.
